@@ -1,6 +1,7 @@
 """Exact constants and the unit conversions of the edges. Inside, everything is SI."""
 
 STANDARD_GRAVITY_MPS2 = 9.80665
+LBF_N = 0.45359237 * STANDARD_GRAVITY_MPS2
 FOOT_M = 0.3048
 MILE_M = 1609.344
 KNOT_MPS = 1852.0 / 3600.0

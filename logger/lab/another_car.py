@@ -9,15 +9,16 @@ the other car has to explain more than any known effect does in a car with this 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 import numpy.typing as npt
 
 from logger.lab.likelihood.map_fit import align, fit
 from logger.lab.likelihood.posterior import Posterior
-from logger.lab.likelihood.priors import UNUSUAL_SIGMA, Tolerance
+from logger.lab.likelihood.priors import CONFLICT_SIGMA, UNUSUAL_SIGMA, Tolerance
 from logger.runs import Run, normalised_rms_error
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.effect import Chosen
@@ -64,7 +65,8 @@ def another_car(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen]
     if error < POOR_ERROR:
         return None
     start = wide.start(effects)
-    drawn = wide.state_at(effects, _cross_entropy_search(wide, effects), start.record, start.size)
+    likeliest = _cross_entropy_search(wide, effects, partial(normalised_rms_error, some.runs))
+    drawn = wide.state_at(effects, likeliest, start.record, start.size)
     found = fit(align(wide, drawn), rounds=10).state
     found_error = wide.error(found)
     lengths = wide.prior.deviations < anything.numbers
@@ -77,6 +79,34 @@ def another_car(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen]
                       {wide.prior.names[index]: float(np.expm1(logs[index])) for index in far})
 
 
+def reading_gain(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen], predictions: Sequence[Array],
+                 tolerance: Tolerance, explains: float = 0.35, sensor: float = 5.0) -> float | None:
+    """How many times what rigs do was read: by the rig, of all that the tolerance allows, whose motion is likest to the
+    readings, whatever their size. None: it may be theirs, as the model explains them, no such rig moves like them, or
+    the factor is a sensor's, or what the vehicle's masses and springs may be off by where a force was measured.
+
+    predictions    of the model (n,) per run
+    explains       up to this error a rig moves like the readings; as of ``another_car``
+    sensor         up to this factor either way it may be one, or friction of a guide that nearly holds the rig
+    """
+    if normalised_rms_error(runs, predictions) < POOR_ERROR:
+        return None
+    wide = Posterior(SimulatedRuns(list(map(_first_part, runs))), vehicle, tolerance)
+
+    def gain_and_error(predictions: Sequence[Array]) -> tuple[float, float]:
+        read, model = (np.concatenate([one - one.mean() for one in parts]) for parts in zip(*(
+            (run.kept_mps2, run.main(one)[run.first:]) for run, one in zip(wide.runs.runs, predictions, strict=True)),
+            strict=True))
+        gain = float(read @ model / max(model @ model, 1e-300))
+        return gain, float(np.linalg.norm(read - gain * model) / np.linalg.norm(read))
+
+    logs = _cross_entropy_search(wide, effects, lambda predictions: gain_and_error(predictions)[1])
+    gain, error = gain_and_error(wide.runs.predict(wide.car(effects, logs)))
+    scale_std = wide.prior.scale_deviation if wide.shows_forces else 0.0
+    is_far = scale_std < 1 and abs(np.log(abs(gain))) > max(np.log(sensor), CONFLICT_SIGMA * scale_std)
+    return gain if error < explains and gain > 0 and is_far else None
+
+
 def _first_part(run: Run, lasts_s: float = 25.0) -> Run:
     """The first part of a run: some thirty bounces of the body are enough to recognise a car by."""
     count = min(run.count, round((run.skip_s + lasts_s) * run.rate_hz))
@@ -85,8 +115,8 @@ def _first_part(run: Run, lasts_s: float = 25.0) -> Run:
                    more=run.more[:, :count])
 
 
-def _cross_entropy_search(wide: Posterior, effects: Sequence[Chosen], rounds: int = 6, draws: int = 60,
-                          best_of: int = 8, least_spread: float = 0.03) -> Array:
+def _cross_entropy_search(wide: Posterior, effects: Sequence[Chosen], error_of: Callable[[list[Array]], float],
+                          rounds: int = 6, draws: int = 60, best_of: int = 8, least_spread: float = 0.03) -> Array:
     """Logarithms (p,) of the numbers of a car that roughly explains a record: the best of many drawn around the best so
     far (the cross-entropy method: R. Y. Rubinstein, Methodology and Computing in Applied Probability 1,
     1999). Each round draws so many and goes on around the mean of the best; their spread, relative to the prior's, is
@@ -96,8 +126,7 @@ def _cross_entropy_search(wide: Posterior, effects: Sequence[Chosen], rounds: in
     best, least = middle, np.inf
     for _ in range(rounds):
         drawn = middle + spread * rng.standard_normal((draws, len(deviations)))
-        errors = np.array([normalised_rms_error(wide.runs.runs, wide.runs.predict(wide.car(effects, one), rough=True))
-                           for one in drawn])
+        errors = np.array([error_of(wide.runs.predict(wide.car(effects, one), rough=True)) for one in drawn])
         ranks = np.argsort(np.where(np.isfinite(errors), errors, np.inf))
         if errors[ranks[0]] < least:
             best, least = drawn[ranks[0]], float(errors[ranks[0]])

@@ -49,7 +49,7 @@ OFFSET, AHEAD, BEHIND = "sensor_offset:offset_m=-1.2", "cg_shift:shift_m=0.47", 
 @pytest.mark.slow
 @pytest.mark.parametrize(("road", "friction_n"), [("A", 300), *release(("A", 200), ("B", 500))])
 def test_a_suspension_that_sticks_is_no_wrong_input(tmp_path: Path, road: str, friction_n: int) -> None:
-    check_model("rav4-2009", MODEL, stuck(tmp_path, road, friction_n), silent, EFFECTS, Tolerance.numbers)
+    check_model("rav4-2009", MODEL, stuck(tmp_path, road, friction_n), silent, EFFECTS, Tolerance())
 
 
 @pytest.mark.slow
@@ -60,7 +60,7 @@ def test_a_sensor_far_from_the_centre_of_gravity_is_no_wrong_input(tmp_path: Pat
                                                                    speed_mps: float) -> None:
     """Below the bounce the sign is that of the wave at hand, not of the next half wave."""
     runs = driven(tmp_path, "A", speed_mps, effect)
-    check_model("rav4-2009", MODEL, runs, silent, EFFECTS, Tolerance.numbers)
+    check_model("rav4-2009", MODEL, runs, silent, EFFECTS, Tolerance())
     prediction, = predicted("rav4-2009", MODEL, runs, ())
     body_hz = undamped_frequencies_hz(structure_of(MODEL.vehicle))[:2]
     for run, sign in ((runs.runs[0], 1), (replace(runs.runs[0], measured_mps2=-runs.runs[0].measured_mps2), -1)):
@@ -73,10 +73,10 @@ def test_a_large_change_by_one_effect_is_no_other_car(tmp_path: Path) -> None:
     """Six numbers of a car, farther off than any are, come near to what a sensor 1.2 m behind the middle feels; the
     sensor's place comes nearer. Where it is not known as an effect, it is another car."""
     runs = driven(tmp_path, "C", 10, "sensor_offset:offset_m=-1.2")
-    check_model("rav4-2009", MODEL, runs, silent, EFFECTS, Tolerance.numbers)
+    check_model("rav4-2009", MODEL, runs, silent, EFFECTS, Tolerance())
     others = {name: EFFECTS[name] for name in ("sensor_gain", "payload")}
     with pytest.raises(BadInput, match="found one of another car"):
-        check_model("rav4-2009", MODEL, runs, silent, others, Tolerance.numbers)
+        check_model("rav4-2009", MODEL, runs, silent, others, Tolerance())
 
 
 @pytest.mark.slow
@@ -86,4 +86,4 @@ def test_a_free_one_in_feet_or_upside_down_is_refused(tmp_path: Path) -> None:
         with pytest.raises(BadInput, match=words):
             check_model("rav4-2009", MODEL,
                         SimulatedRuns([replace(run, measured_mps2=factor * run.measured_mps2)]), silent, EFFECTS,
-                        Tolerance.numbers)
+                        Tolerance())

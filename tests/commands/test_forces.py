@@ -510,17 +510,34 @@ def test_a_record_follows_its_force_though_the_vehicles_mode_lies_elsewhere(
         main(["compare", "--vehicle", vehicle, runs[1]])
 
 
-def test_of_a_record_that_the_model_does_not_explain_units_are_asked_for(
-        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Readings in g under the name of m/s2, of a mass that was weighed."""
+@pytest.mark.parametrize(("read", "pushed", "words"), [
+    (1 / 9.80665, 1.0, r"0\.10\d times .* it looks like accel_z_mps2 in g \("),
+    (1.0, 1e-3, r"found accel_z_mps2 9\d\d times .* it looks like accel_z_mps2 in mm/s2 or force_n in kN \("),
+], ids=["g", "kN"])
+def test_another_unit_is_said(tmp_path: Path, read: float, pushed: float, words: str) -> None:
+    """Of a mass that was weighed, its spring known to a third."""
     push, bench = noise(30.0, 8.0, 4), Bench(0.8, 2000.0, 6.0)
-    record = {"accel_z_mps2": bench.moved(NOTHING, push, NOTHING)["accel_z_mps2"] / 9.80665}
-    (tmp_path / "bench.yaml").write_text(bench.yaml.replace("0.8", "0.8 +- 1%").replace("2000.0", "2000 +- 30%"))
-    run = written(tmp_path / "run", record, {"force_n": push(TIME_S)}, BODY)
-    assert main(["compare", "--vehicle", str(tmp_path / "bench.yaml"), str(run)]) == 0
-    said = " ".join(capsys.readouterr().out.split())
-    assert "explains next to nothing of what was measured" in said
-    assert "check the run's columns, signs and units" in said
+    record = {"accel_z_mps2": bench.moved(NOTHING, push, NOTHING)["accel_z_mps2"] * read}
+    (tmp_path / "bench.yaml").write_text(bench.yaml.replace("0.8", "0.8 +- 1%").replace("2000.0", "1500 +- 30%"))
+    run = written(tmp_path / "run", record, {"force_n": push(TIME_S) * pushed}, BODY)
+    with pytest.raises(BadInput, match=words):
+        main(["compare", "--vehicle", str(tmp_path / "bench.yaml"), str(run)])
+
+
+@pytest.mark.parametrize(("damper", "refused"), [("1500 +- 20%", True), ("unknown", False)])
+def test_a_part_whose_force_is_in_kilonewtons_is_refused_if_its_damper_is_known(
+        tmp_path: Path, damper: str, refused: bool) -> None:
+    way = noise(8.0, 0.004, 6)
+    force_kn = 1.7 * way(TIME_S, 1) + np.random.default_rng(1).normal(0.0, 0.002, len(TIME_S))
+    run = written(tmp_path / "run", {"force_n": force_kn}, {"displacement_m": way(TIME_S)}, "source: me\n")
+    (tmp_path / "part.yaml").write_text("name: part\nmodel: component\nstiffness_n_per_m: 0 +- 2000\n"
+                                        f"damping_n_s_per_m: {damper}\npreload_n: unknown\n")
+    asked = ["compare", "--vehicle", str(tmp_path / "part.yaml"), str(run)]
+    if refused:
+        with pytest.raises(BadInput, match=r"found force_n 0\.00\d+ times .* it looks like force_n in kN"):
+            main(asked)
+    else:
+        assert main(asked) == 0
 
 
 @pytest.mark.parametrize(("spoilt", "words"), [

@@ -16,12 +16,13 @@ M, K, C = 0.79, 280.0, 2.1
 VEHICLE = f"name: mass\nmodel: single_mass\nmass_kg: {M} +- 1%\nstiffness_n_per_m: 350\ndamping_n_s_per_m: 4\n"
 
 
-def decay(place: Path, lasts_s: float = 3.0, friction_n: float = 0.0, step_m: float = 0.0005) -> Path:
+def decay(place: Path, lasts_s: float = 3.0, friction_n: float = 0.0, step_m: float = 0.0005, from_m: float = -0.07,
+          seed: int = 3) -> Path:
     """A run with a record of a mass from 7 cm below its rest, read in steps [m]."""
     time_s = np.arange(0, lasts_s, 0.01)
     state = solve_ivp(lambda _t, s: [s[1], -(K * s[0] + C * s[1] + friction_n * np.tanh(s[1] / 1e-3)) / M],
-                      (0, lasts_s), [-0.07, 0.0], t_eval=time_s, rtol=1e-8, atol=1e-10, max_step=2e-3).y
-    noisy = state[0] + np.random.default_rng(3).normal(0, 2e-4, len(time_s))
+                      (0, lasts_s), [from_m, 0.0], t_eval=time_s, rtol=1e-8, atol=1e-10, max_step=2e-3).y
+    noisy = state[0] + np.random.default_rng(seed).normal(0, 2e-4, len(time_s))
     place.mkdir()
     rows = zip(time_s, step_m * np.round(noisy / step_m), strict=True)
     (place / "drive.csv").write_text("t_s,displacement_m\n" + "".join(f"{t:.2f},{x:.6f}\n" for t, x in rows))
@@ -50,6 +51,13 @@ def test_nothing_is_left_out_and_nothing_is_missing(tmp_path: Path) -> None:
                                ).stdout)
     assert answer["runs"][0]["samples"] == 300
     assert "lacks nothing" in answer["evidence"][0]
+
+
+@pytest.mark.parametrize(("from_m", "repeats"), [(-0.07, True), (-0.04, False)])
+def test_what_is_let_go_from_the_same_place_repeats(tmp_path: Path, from_m: float, repeats: bool) -> None:
+    runs = decay(tmp_path / "one"), decay(tmp_path / "two", from_m=from_m, seed=4)
+    said = called("compare", "--tolerance", "0.5", "--vehicle", tmp_path / "vehicle.yaml", *runs).stdout
+    assert ("one and two are repeats" in " ".join(said.replace(f"{tmp_path}/", "").split())) is repeats
 
 
 @pytest.mark.parametrize("frequency_hz", [20.0, *slow(170.0, 400.0)])

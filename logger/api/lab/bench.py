@@ -210,7 +210,7 @@ def bench_of(word: str, model: CarModel, runs: SimulatedRuns, effect_files: Sequ
     if words := slow_words([one.effect for one in model.effects]):
         warn(words)
     shipped = {name: one for name, one in effects.items() if name not in files}  # the user's own are not tried yet
-    predictions = check_model(word, model, runs, warn, shipped, tolerance.largest, anyway)
+    predictions = check_model(word, model, runs, warn, shipped, tolerance, anyway)
     _try_own(found, effect_files)
     return replace(found, runs=_in_their_bands(runs, predictions))
 

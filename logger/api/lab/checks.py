@@ -15,10 +15,11 @@ from statistics import median
 from typing import TYPE_CHECKING
 
 from logger.errors import BadInput
-from logger.units import FOOT_M, STANDARD_GRAVITY_MPS2
+from logger.units import FOOT_M, LBF_N, STANDARD_GRAVITY_MPS2
 
 if TYPE_CHECKING:
     from logger.lab.another_car import AnotherCar
+    from logger.lab.likelihood.priors import Tolerance
     from logger.lab.road_match import RoadMatch
     from logger.runs import Array, Bools, Run, Signal
     from logger.simulation.virtual_drive import SimulatedRuns
@@ -38,6 +39,12 @@ _UNITS = (
     (_RECORD, "mm/s2", 1000.0), (_RECORD, "ft/s2", 1 / FOOT_M),
     (_PROFILE, "mm", 0.001), (_PROFILE, "cm", 0.01), (_PROFILE, "inches", FOOT_M / 12), (_PROFILE, "feet", FOOT_M),
 )
+# The same on rigs, by what is measured: readings in a unit over those in N, m or m/s2.
+_LENGTHS = (("mm", 1000.0), ("cm", 100.0), ("inches", 12 / FOOT_M))
+_SIZES = {"force": (("kN", 1e-3), ("kgf", 1 / STANDARD_GRAVITY_MPS2), ("lbf", 1 / LBF_N)), "length": _LENGTHS,
+          "acceleration": tuple((unit, size) for what, unit, size in _UNITS if what == _RECORD)}
+_KINDS = {"displacement": "length", "travel": "length", "velocity": "length"}
+_APART = 2.0  # kgf and lbf are
 _SENSOR_GAIN = (0.2, 5.0)
 """Within these a factor may be a sensor's: the bounds of the effect ``sensor_gain``."""
 ANYWAY = "--anyway goes on"
@@ -46,7 +53,7 @@ _NAMED = 4
 
 
 def check_model(word: str, model: CarModel, runs: SimulatedRuns, warn: Callable[[str], None],
-                known: Mapping[str, Effect], numbers: float, anyway: bool = False) -> list[Array]:
+                known: Mapping[str, Effect], tolerance: Tolerance, anyway: bool = False) -> list[Array]:
     """What the model predicts (n,) per run. Raises BadInput where an effect of the model cannot be on one of the runs,
     the model's motion grows without bound, or the road moves no car; and where the sensor was upside down, a run or its
     profile is in another unit, or the road or the car is another one, unless the user wants to go on ``anyway`` (then
@@ -54,7 +61,7 @@ def check_model(word: str, model: CarModel, runs: SimulatedRuns, warn: Callable[
 
     word       by which the user knows the vehicle
     known      effects, by name: where one of them explains the runs as another car would, it may be this car
-    numbers    deviation of what the car's numbers are usually off by, as a share
+    tolerance  of the vehicle's numbers
     """
     from logger.vehicle.compose import compose
 
@@ -62,8 +69,9 @@ def check_model(word: str, model: CarModel, runs: SimulatedRuns, warn: Callable[
     car = compose(model.vehicle, model.effects)
     followed = _followed(runs, predictions, car)
     # One after the other: whether it is the car is asked of runs that are right, and takes seconds.
-    _say(chain(_other_ways_up(runs, followed), _other_units(runs, followed, numbers), _other_roads(runs, followed, car),
-               _another_car(word, model, runs, predictions, known, numbers)), warn, anyway)
+    _say(chain(_other_ways_up(runs, followed), _other_units(runs, followed),
+               _other_units_on_rig(model, runs, predictions, tolerance), _other_roads(runs, followed, car),
+               _another_car(word, model, runs, predictions, known, tolerance.largest)), warn, anyway)
     return predictions
 
 
@@ -160,6 +168,8 @@ def _followed(runs: SimulatedRuns, predictions: Sequence[Array], car: Car) -> _F
 
 def _moves(run: Run, prediction: Array) -> bool:
     model = run.main(prediction)[run.first:]
+    if run.timed:  # a small rig, or one whose force is in another unit
+        return bool(model.any())
     return float(model @ model) >= _MODEL_CHECKS_LEAST_MPS2**2 * len(model)
 
 
@@ -171,25 +181,46 @@ def _other_ways_up(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
                    f"go with the model (correlation {around.turned:.2f})")
 
 
-def _other_units(runs: SimulatedRuns, followed: _Followed, numbers: float) -> Iterator[str]:
-    """Which runs or profiles are in another unit, the nearest one. A factor that a sensor's gain may be, or on a rig
-    the friction of a guide that nearly holds it, is a unit only if it is one, and all runs agree, and below the bounce
-    the median of the runs as well: there the body moves with the road whatever is missing, but one run holds few such
-    waves. A rig of which less is known than usual (``numbers``) may resonate anywhere, with any factor."""
-    from logger.lab.likelihood.priors import Tolerance
-
-    if not followed.pairs or (numbers > Tolerance().numbers and followed.pairs[0][0].timed):
+def _other_units(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
+    """Which runs on roads, or profiles, are in another unit, the nearest one. A factor that a sensor's gain may be is a
+    unit only if it is one, and all runs agree, and below the bounce the median of the runs as well: there the body
+    moves with the road whatever is missing, but one run holds few such waves."""
+    if not followed.pairs or followed.pairs[0][0].timed:
         return
     clear = [(run, around.gain, below.gain) for (run, _), around, below in
              zip(followed.pairs, followed.around, followed.below, strict=True)
              if around.is_clear and run.facts.main.measures == "acceleration"]
     for run, gain, _ in clear:
         what, unit, size = min(_UNITS, key=lambda one: abs(log(gain / one[2])))
-        may_be_else = run.timed or _SENSOR_GAIN[0] < gain < _SENSOR_GAIN[1]
+        may_be_else = _SENSOR_GAIN[0] < gain < _SENSOR_GAIN[1]
         gains = [*(around for _, around, _ in clear), median(below for _, _, below in clear)]
         if not may_be_else or all(abs(one / size - 1) < _NEAR for one in gains):
             yield (f"{run.name}: expected accelerations in m/s2 and elevations in m, found {gain:.3g} times what the "
                    f"model says: {what} in {unit}")
+
+
+def _other_units_on_rig(model: CarModel, runs: SimulatedRuns, predictions: Sequence[Array], tolerance: Tolerance
+                        ) -> Iterator[str]:
+    """That what rigs did, or what drives them, was written in another unit."""
+    from logger.lab.another_car import reading_gain
+    from logger.profiles.excitation import Excitation
+
+    run, main = runs.runs[0], runs.runs[0].facts.main
+    track = run.track
+    if not isinstance(track, Excitation) or track.is_still:
+        return
+    gain = reading_gain(runs.runs, model.given or model.vehicle, model.effects, predictions, tolerance)
+    if gain is None:
+        return
+    drives = {"force": "force_n"} if track.forces else {"displacement": (
+        "displacement_m" if track.moves_part else "elevation_m")}
+    sizes = [(main.name, unit, size) for unit, size in _SIZES[_KINDS.get(main.measures, main.measures)]]
+    sizes += [(name, unit, 1 / size) for kind, name in drives.items() for unit, size in _SIZES[_KINDS.get(kind, kind)]]
+    nearest = min((size for _, _, size in sizes), key=lambda size: abs(log(gain / size)))
+    likely = " or ".join(f"{name} in {unit}" for name, unit, size in sizes
+                         if abs(size / nearest - 1) < _NEAR and abs(log(gain / nearest)) < log(_APART))
+    yield (f"{run.name}: expected N, m and m/s2, found {main.name} {gain:.3g} times what any rig reads that the "
+           f"vehicle's file allows: " + (f"it looks like {likely}" if likely else "is a column in another unit?"))
 
 
 def _other_roads(runs: SimulatedRuns, followed: _Followed, car: Car) -> Iterator[str]:

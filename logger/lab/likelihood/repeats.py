@@ -64,12 +64,12 @@ def find_repeats(runs: Sequence[Run], residuals: Sequence[Array] | None = None) 
 def repeat_each_other(first: Run, other: Run) -> bool:
     """Whether two runs are of one excitation: tables and forces differ by no more than what counts as explained. (Two
     runs of one command on a bench car were measured to differ by 6 to 9 %, other sweeps differ by their whole size.)
-    """
+    What nothing drives repeats another that begins alike: then all of it is."""
     one, two = first.track, other.track
     if not (isinstance(one, Excitation) and isinstance(two, Excitation)) or (
             (one.rate_hz, one.start_s, one.forces) != (two.rate_hz, two.start_s, two.forces)):
         return False
-    pairs = [(one.elevation_m, two.elevation_m)]
+    pairs = [(first.measured_mps2, other.measured_mps2) if one.is_still else (one.elevation_m, two.elevation_m)]
     if one.force_n is not None and two.force_n is not None:
         pairs += zip(one.force_n.T, two.force_n.T, strict=True)
     return all(_alike(here, there) for here, there in pairs)
