@@ -14,7 +14,6 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import degrees
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import numpy.typing as npt
@@ -31,14 +30,34 @@ from logger.api.extraction import (
     write_runs,
 )
 from logger.bounds import ACCELERATION, SPEED, samples_between
-from logger.dsp.repeated_samples import find_holds, still_until_s
+from logger.dsp.repeated_samples import find_holds, resolution, still_until_s
 from logger.errors import BadInput
+from logger.estimation.drive_alignment import DriveAlignment
+from logger.estimation.receiver_delay import CarriedDelay, combined
+from logger.extraction.recorded_columns import (
+    GRAVITY_WITHIN,
+    LONGEST_HOLE_S,
+    NO_GRAVITY_MPS2,
+    SEEN,
+    EvenSamples,
+    even_samples,
+    felt,
+    hidden_m,
+    new_rows,
+    speeds_of_places,
+    turns,
+    upwards,
+    way_over_speed,
+)
 from logger.left_out import LeftOut
 from logger.printable import counted, word
 from logger.runs import RecordFacts
+from logger.service import wiring
 from logger.service.config import Config
 from logger.service.doubted_spans import MOVING_MPS
 from logger.service.drive_readings import GridReadings
+from logger.service.learning import delay_at_start
+from logger.shipped import vehicle_path
 from logger.store.formats.logger_csv import (
     ACCELERATION_UNITS,
     AXES,
@@ -58,12 +77,8 @@ from logger.store.formats.logger_csv import (
     units_of,
 )
 from logger.store.formats.record_checks import still_doubts
+from logger.store.formats.vehicle_file import read_model
 from logger.units import STANDARD_GRAVITY_MPS2
-
-if TYPE_CHECKING:
-    from logger.estimation.receiver_delay import CarriedDelay
-    from logger.extraction.recorded_columns import EvenSamples
-
 
 Array = npt.NDArray[np.float64]
 
@@ -119,11 +134,6 @@ def extract_csv(source: Path, out: Path, asked: CsvSettings, given: Config | Non
 
 def recorded_csv(source: Path, asked: CsvSettings, config: Config, tell: Tell) -> Recorded:
     """All of a recording. BadInput as ``extract_csv``."""
-    from logger.extraction.recorded_columns import SEEN, even_samples
-    from logger.service import wiring
-    from logger.shipped import vehicle_path
-    from logger.store.formats.vehicle_file import read_model
-
     if asked.vehicle is not None:
         config = replace(config, vehicle=vehicle_path(asked.vehicle))
     model = wiring.car_of(config, read_model)
@@ -274,8 +284,6 @@ def _listed(table: LoggerTable) -> str:
 
 def _accelerations(tables: _Tables, asked: CsvSettings, notes: list[str]) -> tuple[Array, Array, bool]:
     """Times (n,) [s], samples (n, axes) [m/s2], and whether gravity is in them."""
-    from logger.extraction.recorded_columns import felt
-
     table = tables.acceleration
     roles = AXES if "x" in table.columns else ("up",)
     time_s, samples = _ordered(table, seconds(table), roles, notes)
@@ -309,8 +317,6 @@ def _in_si(table: LoggerTable, time_s: Array, samples: Array, unit: str | None, 
            roles: tuple[str, ...], asked: CsvSettings, notes: list[str]) -> tuple[Array, bool]:
     """Samples in m/s2, and whether gravity is in them. A unit that is said holds; the size of gravity shows one only
     where none is. ``is_linear``: gravity was taken out, as the layout or --up says."""
-    from logger.extraction.recorded_columns import GRAVITY_WITHIN, NO_GRAVITY_MPS2, felt
-
     path, of_g = table.header.path, ACCELERATION_UNITS["g"]
     named = f"{roles[0]}={table.known.columns[roles[0]].header}:UNIT"
     found = felt(time_s, samples, ACCELERATION_UNITS.get(unit or ""))
@@ -371,8 +377,6 @@ def _left_out(even: EvenSamples, count: int, still_s: float) -> tuple[LeftOut, .
 
 
 def _repairs(even: EvenSamples) -> list[str]:
-    from logger.extraction.recorded_columns import SEEN
-
     notes = []
     if even.repeats > 0:
         notes.append(f"{even.repeats:.0%} of the samples only repeated the one before and were dropped: "
@@ -395,8 +399,6 @@ def _repairs(even: EvenSamples) -> list[str]:
 
 def _without_standstill(even: EvenSamples, fixes: Fixes, notes: list[str]) -> tuple[EvenSamples, float]:
     """Without what a sensor said that stood still from the beginning, while the car drove; and how long it did [s]."""
-    from logger.extraction.recorded_columns import LONGEST_HOLE_S
-
     still = even.time_s <= still_until_s(even.time_s, even.samples)
     still &= np.interp(even.time_s, fixes.time_s, fixes.speed_mps) >= MOVING_MPS if len(fixes.time_s) else False
     if (lasts_s := np.count_nonzero(still) / RATE_HZ) <= LONGEST_HOLE_S:
@@ -407,8 +409,6 @@ def _without_standstill(even: EvenSamples, fixes: Fixes, notes: list[str]) -> tu
 
 def _levelled(even: EvenSamples, asked: CsvSettings, has_gravity: bool, notes: list[str]) -> GridReadings:
     """What points up, part by part where the recorder turned in its mount."""
-    from logger.extraction.recorded_columns import turns, upwards
-
     time_s, present = even.time_s, even.present.copy()
     accel = np.zeros(len(time_s))
     if not has_gravity:
@@ -437,8 +437,6 @@ def _levelled(even: EvenSamples, asked: CsvSettings, has_gravity: bool, notes: l
 
 def _step_mps2(samples: Array) -> float | None:
     """What readings (n, axes) are rounded to, by the axis along which gravity is felt most; None: they are not."""
-    from logger.dsp.repeated_samples import resolution
-
     axis = samples[:, int(np.argmax(np.abs(samples.mean(axis=0))))]
     return resolution(axis) or None if len(np.unique(axis)) < 0.5 * len(axis) else None
 
@@ -483,8 +481,6 @@ def fixes_of(table: LoggerTable, origin_s: float, beside: LoggerTable, standing_
 
     Raises BadInput with the line for what cannot be, and for a speed of a unit that is not known.
     """
-    from logger.extraction.recorded_columns import hidden_m, new_rows, speeds_of_places
-
     has_places = set(PLACE) <= set(table.columns)
     has_speed = "speed" in table.columns
     roles = (*(PLACE if has_places else ()), *(("speed",) if has_speed else ()))
@@ -527,8 +523,6 @@ def _speed_scale(table: LoggerTable) -> float:
 
 def check_speed(table: LoggerTable, fixes: Fixes) -> None:
     """BadInput where places belie the speed: its unit is another one."""
-    from logger.extraction.recorded_columns import way_over_speed
-
     if "speed" not in table.columns or not fixes.have_places:
         return
     ratio = way_over_speed(fixes.time_s, fixes.lat_deg, fixes.lon_deg, fixes.speed_mps)
@@ -541,10 +535,6 @@ def check_speed(table: LoggerTable, fixes: Fixes) -> None:
 
 def receiver_of(config: Config, even: EvenSamples, fixes: Fixes, learns: bool) -> CarriedDelay:
     """How late fixes are: by the settings, else what is usual and what braking shows."""
-    from logger.estimation.drive_alignment import DriveAlignment
-    from logger.estimation.receiver_delay import combined
-    from logger.service.learning import delay_at_start
-
     known = delay_at_start(config.gps, None)
     if not learns or known.std_s == 0.0:
         return known

@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -20,29 +20,43 @@ from drivers.dump import open_dump
 from drivers.errors import SettingsError
 from drivers.readings import folder_name
 from logger.errors import BadInput
+from logger.estimation.drive_alignment import DriveAlignment
+from logger.estimation.receiver_delay import CarriedDelay, combined
+from logger.extraction.along_track import (
+    ASIDE_M,
+    GPS_PLACE_M,
+    NEAREST_FIXES_S,
+    MeasuredLine,
+    Observations,
+    Pass,
+    Predict,
+    Registered,
+    RunGrid,
+    TrackMotion,
+    goes_back,
+    motion_of,
+    passes,
+    registered,
+    run_grid,
+)
+from logger.extraction.recorded_columns import fix_times_s, stretches
 from logger.files import make_folder, remove_file, together
 from logger.left_out import LeftOut, counting
-from logger.runs import BY_RECEIVER, BY_ROAD, CLIPPED, NO_READING, READING, RecordFacts
+from logger.runs import BY_RECEIVER, BY_ROAD, CLIPPED, NO_READING, READING, RecordFacts, Run
+from logger.service import wiring
 from logger.service.config import Config
+from logger.service.drive_readings import DriveReadings, GridReadings
+from logger.service.event_core import EventCore
+from logger.service.main_loop import Player
+from logger.service.signal_chain import Axis
+from logger.service.wiring import Instrument, check_recorded_rate
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats import drive_file
 from logger.store.formats.drive_file import RUN, read_run_facts, write_run_facts
 from logger.store.formats.profile_file import Wheelpaths, read_places, read_profile
+from logger.store.formats.vehicle_file import CarModel, read_model
 from logger.units import STANDARD_GRAVITY_MPS2, US_PER_S
-
-if TYPE_CHECKING:
-    from logger.estimation.receiver_delay import CarriedDelay
-    from logger.extraction.along_track import (
-        MeasuredLine,
-        Observations,
-        Pass,
-        Predict,
-        Registered,
-        RunGrid,
-        TrackMotion,
-    )
-    from logger.service.drive_readings import GridReadings
-    from logger.service.wiring import Instrument
-    from logger.store.formats.vehicle_file import CarModel
+from logger.vehicle.compose import compose
 
 
 def name_of(dump: Path) -> str:
@@ -70,16 +84,6 @@ def extract_dump(dump: Path, out: Path, given: Config | None, measured: Measured
 
 def recorded_dump(dump: Path, given: Config | None, vehicle: str | None, tell: Tell) -> Recorded:
     """All of a dump. BadInput and DumpError as ``extract_dump``."""
-    from logger.estimation.drive_alignment import DriveAlignment
-    from logger.estimation.receiver_delay import combined
-    from logger.service import wiring
-    from logger.service.drive_readings import DriveReadings
-    from logger.service.event_core import EventCore
-    from logger.service.main_loop import Player
-    from logger.service.signal_chain import Axis
-    from logger.service.wiring import check_recorded_rate
-    from logger.store.formats.vehicle_file import read_model
-
     with open_dump(dump) as reader:
         config = wiring.config_for_dump(reader.header, given, vehicle, place=f"{dump}:1")
         sensor = wiring.instrument(config.accelerometer, wiring.noise_for_dump(reader.header, config, f"{dump}:1"))
@@ -134,8 +138,6 @@ class _NoRows:
 
 def _fixes(kept: Any, later_s: float) -> Fixes:
     """Fixes of a drive, ``later_s`` earlier than they were placed on the way [s]."""
-    from logger.extraction.recorded_columns import fix_times_s
-
     whole = [timed for timed in kept.fixes if timed.fix.valid and timed.fix.speed_mps is not None
              and timed.fix.lat_deg is not None and timed.fix.lon_deg is not None]
     placed_s, named_s, speed_mps, lat_deg, lon_deg = np.array([
@@ -221,8 +223,6 @@ class MeasuredProfile:
 
 def read_measured_profile(path: Path) -> MeasuredProfile:
     """A profile with ``lat_deg,lon_deg``. Raises BadInput for one that is not what it should be."""
-    from logger.extraction.along_track import MeasuredLine
-
     profile, places = read_profile(path, judged=True), read_places(path)
     try:
         return MeasuredProfile(path, profile, MeasuredLine.of(*places))
@@ -276,8 +276,6 @@ class Recorded:
 
 def apart(time_s: Array) -> npt.NDArray[np.bool_]:
     """Which fixes (k,) come after those that are taken before them by as much as fixes do."""
-    from logger.extraction.along_track import NEAREST_FIXES_S
-
     taken, last_s = np.zeros(len(time_s), dtype=np.bool_), -np.inf
     for index, fix_s in enumerate(time_s.tolist()):
         if fix_s > last_s + NEAREST_FIXES_S:
@@ -359,8 +357,6 @@ def even_drives(recorded: Recorded, source: Path) -> list[drive_file.Drive]:
 
 def _drives(recorded: Recorded, measured: MeasuredProfile | None) -> tuple[list[_Drive], tuple[LeftOut, ...]]:
     """The runs of a dump, and what was left out of it."""
-    from logger.extraction.recorded_columns import stretches
-
     config, fixes, readings = recorded.config, recorded.fixes, recorded.readings
     found: list[_Drive] = []
     seconds = dict.fromkeys(("driven", "unknown", "parked"), 0.0)
@@ -393,8 +389,6 @@ def _drives(recorded: Recorded, measured: MeasuredProfile | None) -> tuple[list[
 
 def _off_the_line(line: MeasuredLine, driven_m: Array, along_m: Array, aside_m: Array) -> str:
     """Why a drive, by fixes (k,), has no pass over a line."""
-    from logger.extraction.along_track import ASIDE_M, goes_back
-
     if goes_back(driven_m, along_m, aside_m):
         return ": the drive goes along the profile from its end to its beginning"
     near = aside_m <= ASIDE_M
@@ -407,8 +401,6 @@ def _off_the_line(line: MeasuredLine, driven_m: Array, along_m: Array, aside_m: 
 
 def _along(recorded: Recorded, fixes: Fixes, measured: MeasuredProfile | None) -> list[_Drive]:
     """The runs of a stretch without a break: one, or one for each pass over the profile."""
-    from logger.extraction.along_track import motion_of, passes
-
     speeds = _speeds(fixes, recorded.config)
     motion = motion_of(speeds)
     if measured is None:
@@ -422,8 +414,6 @@ def _along(recorded: Recorded, fixes: Fixes, measured: MeasuredProfile | None) -
 
 
 def _speeds(fixes: Fixes, config: Config) -> Observations:
-    from logger.extraction.along_track import Observations
-
     speed_mps = np.where(fixes.speed_mps < config.pipeline.stationary_mps, 0.0, fixes.speed_mps)
     return Observations(fixes.time_s, speed_mps, np.ones(len(speed_mps)))
 
@@ -431,8 +421,6 @@ def _speeds(fixes: Fixes, config: Config) -> Observations:
 def _on_profile(recorded: Recorded, fixes: Fixes, along_m: Array, one: Pass, measured: MeasuredProfile
                 ) -> _Drive | None:
     """A pass, laid on the profile's distance and cut to it; None for one that is too short."""
-    from logger.extraction.along_track import GPS_PLACE_M, Observations, registered
-
     part = slice(one.first, one.last)
     fixes, along_m = fixes.part(part), along_m[part]
     ahead_m = recorded.config.gps.antenna_behind_front_axle_m
@@ -451,10 +439,6 @@ def _on_profile(recorded: Recorded, fixes: Fixes, along_m: Array, one: Pass, mea
 
 
 def _predictor(recorded: Recorded, time_s: Array, track: Any) -> Predict:
-    from logger.runs import Run
-    from logger.simulation.virtual_drive import SimulatedRuns
-    from logger.vehicle.compose import compose
-
     car = compose(recorded.model.vehicle, recorded.model.effects)
     nothing = np.zeros(len(time_s))
 
@@ -478,8 +462,6 @@ def _drive(readings: tuple[RunGrid, Array, Array], fixes: Fixes, motion: TrackMo
 def _readings(recorded: Recorded, fixes: Fixes) -> tuple[RunGrid, Array, Array]:
     """Samples on the grid of a run, within the fixes: accelerations without gravity and offset, and how usable they
     are, (n,) each."""
-    from logger.extraction.along_track import run_grid
-
     readings = recorded.readings
     inside = (readings.time_s >= fixes.time_s[0]) & (readings.time_s <= fixes.time_s[-1])
     present, clipped = readings.present[inside], readings.clipped[inside]
