@@ -105,18 +105,18 @@ _STEP_ERROR, _LEAST_DAMPING = 3e-3, 1e-3  # the error is that of the lab's discr
 _FINER_WITH_FRICTION = 2
 
 
-def steps_hz(vehicle: Vehicle, usual_hz: float = FINE_RATE_HZ) -> float:
+def steps_hz(vehicle: Vehicle) -> float:
     """Steps a second in which a vehicle is simulated: as usual for one whose wheels hop as those of cars do, twice as
     many for one an octave quicker, and so on up to four octaves; more for a mass on a base that little damps. A force
     that is a straight line over a step of h moves a resonance at f by (2 pi f h)^2 / 12 at most, which at a damping
     ratio z is a share (2 pi f h)^2 / 24 z of its amplitude."""
     structure = structure_of(vehicle)
-    needed_hz = float(undamped_frequencies_hz(structure)[-1]) / _HOP_HZ * usual_hz
+    needed_hz = float(undamped_frequencies_hz(structure)[-1]) / _HOP_HZ * FINE_RATE_HZ
     for one in vibrating(modes(structure)) if structure.on_base and not structure.held else []:
         needed_hz = max(needed_hz, 2 * np.pi * one.frequency_hz / np.sqrt(24 * max(one.damping_ratio, _LEAST_DAMPING)
                                                                           * _STEP_ERROR))
-    octaves = float(np.round(np.log2(max(needed_hz / usual_hz, 1.0))))
-    return usual_hz * min(2**octaves, _MOST_FINER)
+    octaves = float(np.round(np.log2(max(needed_hz / FINE_RATE_HZ, 1.0))))
+    return FINE_RATE_HZ * min(2**octaves, _MOST_FINER)
 
 
 class SimulatedRuns:

@@ -195,10 +195,7 @@ class LinearCar:
         """The reading per elevation under each wheel separately (..., w) [1/s2] for waves exp(2 pi i f t), f (...)
         [Hz]; no delay between the wheels, no contact patch."""
         s, output = np.asarray(2j * np.pi * np.asarray(f_hz, float)), self.output
-        if self.corners:
-            read = s[..., None] ** output.order * (output.row @ self._coordinates(s)) + output.road_row
-        else:
-            read = frequency_response(self.structure, [output], f_hz)[..., 0, :]
+        read = s[..., None] ** output.order * (output.row @ self._coordinates(s)) + output.road_row
         return self._through_sensors(s, read)
 
     def response(self, f_hz: npt.ArrayLike, speed_mps: npt.ArrayLike) -> Complex:
@@ -226,13 +223,12 @@ class LinearCar:
         return Waves(travel, rate, passed * rate, deflection, whole * deflection, height)
 
     def travel_by_wheel(self, f_hz: Array) -> Complex:
-        """Travel of each suspension per elevation under each wheel separately (f, w, w), of a car with laws of its own;
-        waves and delays as ``by_wheel``."""
+        """Travel of each suspension per elevation under each wheel separately (f, w, w); waves and delays as
+        ``by_wheel``."""
         return np.asarray(self.structure.travel @ self._coordinates(np.asarray(2j * np.pi * f_hz)))
 
     def by_force(self, f_hz: Array) -> Complex:
-        """The reading per force in each suspension (f, w) [1/kg], of a car with laws of its own; a force pulls body and
-        wheel together."""
+        """The reading per force in each suspension (f, w) [1/kg]; a force pulls body and wheel together."""
         s, structure = np.asarray(2j * np.pi * f_hz), self.structure
         moved = np.linalg.solve(self._dynamic(s)[0], -structure.travel.T.astype(complex))
         return self._through_sensors(s, s[..., None] ** self.output.order * (self.output.row @ moved))
@@ -244,7 +240,7 @@ class LinearCar:
         return np.asarray(read)
 
     def _coordinates(self, s: Complex) -> Complex:
-        """Of the car with laws of its own, per elevation under each wheel (..., n, w), at s (...) [1/s]."""
+        """Per elevation under each wheel (..., n, w), at s (...) [1/s]."""
         dynamic, pressed = self._dynamic(s)
         return np.asarray(np.linalg.solve(dynamic, self.structure.road + pressed))
 
@@ -253,6 +249,8 @@ class LinearCar:
         """Damping and stiffness (n, n) with the laws of the corners, as far as these are springs and dampers; of a
         damper behind a mount as if that were rigid."""
         structure, corners = self.structure, self.corners
+        if not corners:
+            return structure.damping, structure.stiffness
         travel, wheel = structure.travel, structure.wheels
         body = travel + wheel
         damped = np.array([one.damper_n_s_per_m + one.beside_n_s_per_m for one in corners]) - structure.dampers
@@ -271,6 +269,8 @@ class LinearCar:
         """What q is multiplied by (..., n, n), and what the laws of the tires add to the road's force (..., n, w)."""
         structure = self.structure
         dynamic = dynamic_stiffness(structure.mass, *self.matrices, s)
+        if not self.corners:
+            return dynamic, np.zeros(1, np.complex128)
         tire = np.stack([one.tire(s, own) for one, own in zip(self.corners, structure.tires, strict=True)], axis=-1)
         pressed = structure.wheels.T * tire[..., None, :]
         for i, one in enumerate(self.corners):

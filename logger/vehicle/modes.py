@@ -52,8 +52,6 @@ def modes_of_car(car: LinearCar) -> list[Mode]:
     """The same of a car with laws of its own at the corners: a mount in series with a damper is one state more, its
     compression y, with y' = J q' - k y / c and the force k y on the suspension; so are the states of laws by all that
     moves."""
-    if not car.corners:
-        return modes(car.structure)
     structure, corners = car.structure, car.corners
     n, travel, wheels = len(structure.mass), structure.travel, structure.wheels
     mounted = [i for i, one in enumerate(corners) if np.isfinite(one.mount_n_per_m) and one.damper_n_s_per_m > 0]

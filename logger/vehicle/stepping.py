@@ -65,20 +65,6 @@ def force_input(structure: Structure) -> Array:
     return np.vstack([np.zeros_like(onto), np.linalg.solve(structure.mass, onto)])
 
 
-def march(structure: Structure, laws: Sequence[CornerLaws], elevation: Array, mean: Array, step_s: float,
-          way: Way | None = None) -> Motion:
-    """The motion of a car on a road, from rest.
-
-    laws         one per wheel
-    elevation    (M, u) under the wheels at the instants [m], or of what inputs the structure has
-    mean         (M - 1, u) over each step [m]
-    way          None: it stands at 0, and time begins there
-
-    ValueError for a law by all that moves that cannot be compiled.
-    """
-    return Stepper.of(structure, laws, step_s).march(elevation, mean, way)
-
-
 @dataclass(frozen=True, eq=False)
 class Stepper:
     """A car with its laws in steps of one length: all that is the same on every road.
@@ -101,7 +87,7 @@ class Stepper:
 
     @staticmethod
     def of(structure: Structure, laws: Sequence[CornerLaws], step_s: float) -> Stepper:
-        """As ``march``."""
+        """Of laws, one per wheel. ValueError for one by all that moves that cannot be compiled."""
         from logger.vehicle.stepping_loop import LANES  # loads the compiler, if there is one
 
         n, w = len(structure.mass), len(structure.wheels)
@@ -134,7 +120,12 @@ class Stepper:
             np.array([one.places for one in rubbing], dtype=np.int64).reshape(-1, 3))
 
     def march(self, elevation: Array, mean: Array, way: Way | None = None, begins: Array | float = 0.0) -> Motion:
-        """The motion on a road, as ``stepping.march``, from a state that differs by ``begins`` (2 n,) from rest."""
+        """The motion on a road, from a state that differs by ``begins`` (2 n,) from rest.
+
+        elevation    (M, u) under the wheels at the instants [m], or of what inputs the structure has
+        mean         (M - 1, u) over each step [m]
+        way          None: it stands at 0, and time begins there
+        """
         from logger.vehicle.stepping_loop import steps
 
         structure, n = self.structure, len(self.structure.mass)

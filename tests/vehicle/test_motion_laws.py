@@ -25,10 +25,11 @@ from logger.vehicle.laws import Between, MotionLaw, Seen, linear
 from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.linearise import known_vehicle
 from logger.vehicle.modes import modes_of_car
-from logger.vehicle.stepping import Way, march
+from logger.vehicle.stepping import Way
 from logger.vehicle.vehicle import Axle, Vehicle
 
 from ..support.drives.course import integrated
+from ..support.drives.linear_drive import march
 
 RIG = Vehicle("rig", "quarter_car", 300.0, None, Axle(0.0, 40.0, 20000.0, 600.0, 2e5), None, 0.25)
 STEP_S, LASTS_S = 5e-4, 2.0

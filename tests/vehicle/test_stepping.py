@@ -24,10 +24,11 @@ from logger.vehicle.compose import compose, recorded, respond
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.models import structure_of
 from logger.vehicle.simulate import Passage, recorder_taps
-from logger.vehicle.stepping import march, static_tire_loads_n
+from logger.vehicle.stepping import static_tire_loads_n
 from logger.vehicle.structure import suspension_travel, wheel
 from logger.vehicle.vehicle import Axle, Vehicle
 
+from ..support.drives.linear_drive import march
 from ..support.drives.newton_car import road_under
 
 RAV4 = read_vehicle(vehicle_file("rav4-2009"))

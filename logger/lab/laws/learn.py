@@ -83,27 +83,13 @@ DECISIVE = 2 * INDISTINGUISHABLE
 """What a law has to gain over known effects that explain all: twice what distinguishes two of them."""
 
 
-@dataclass(frozen=True)
-class LawEffort:
-    """How much work the choice of a law takes.
-
-    listed                          how many known effects are sought first, unless a law outdoes them, and on top of a
-                                    law; all as usual where no law alone explains what is left
-    worth_narrowing                 families of which one axle alone is tried
-    fitted, of_a_family, refined    how many laws are fitted on a model, of one family at most, and with derivatives of
-                                    their own
-    fit_share, refine_share         of what the best one is predicted to gain, and gains
-    in_full                         how many laws are tried, one after the other, where those before say nothing
-    """
-
-    listed: int = 2
-    worth_narrowing: int = 3
-    fitted: int = 5
-    of_a_family: int = 3
-    refined: int = 2
-    fit_share: float = 0.2
-    refine_share: float = 0.5
-    in_full: int = 3
+_LISTED = 2
+"""Known effects that are sought first, unless a law outdoes them, and on top of a law; all as usual where no law alone
+explains what is left."""
+_WORTH_NARROWING, _FITTED, _OF_A_FAMILY, _REFINED, _IN_FULL = 3, 5, 3, 2, 3
+"""Families of which one axle alone is tried; laws that are fitted on a model, of one family at most, and with
+derivatives of their own; and that are tried in full, one after the other, where those before say nothing."""
+_FIT_SHARE, _REFINE_SHARE = 0.2, 0.5  # of what the best one is predicted to gain, and gains
 
 
 @dataclass(frozen=True, eq=False)
@@ -179,7 +165,7 @@ class Learning:
 
 def learn(posterior: Posterior, effects: Mapping[str, Effect], families: Mapping[str, Family],
           known: Mapping[str, Effect], present: Sequence[Chosen] = (), progress: Progress = lambda words: None,
-          workers: int = 2, effort: LawEffort | None = None) -> Learning:
+          workers: int = 2) -> Learning:
     """Learn a law, in so many threads.
 
     effects     the known effects that are searched first, by name
@@ -187,12 +173,11 @@ def learn(posterior: Posterior, effects: Mapping[str, Effect], families: Mapping
 
     ValueError where the vehicle lacks what an effect needs.
     """
-    effort = effort or LawEffort()
     one = replace(SearchEffort(), effects=1)
     search, selection = search_effects(posterior, effects, present, progress, workers, one)
-    choice = _LawChoice(search, selection, families, known, effort)
+    choice = _LawChoice(search, selection, families, known)
     if not choice.outdoes_two():
-        choice = choice.seeking(effort.listed)
+        choice = choice.seeking(_LISTED)
     law = choice.explaining_all()
     if law is None:
         choice = choice.seeking(SearchEffort().effects)
@@ -233,7 +218,6 @@ class _LawChoice:
     selection: Selection
     families: Mapping[str, Family]
     known: Mapping[str, Effect]
-    effort: LawEffort
     kept: list[tuple[Baseline, list[LawFit]]] = field(default_factory=list)
     ended: dict[LawFit, tuple[Baseline, dict[str, float]]] = field(default_factory=dict)
     refused: dict[str, Refusal] = field(default_factory=dict)
@@ -303,7 +287,7 @@ class _LawChoice:
         """The first law that says something once it is fitted to the end, of those that score less than ``least``, as
         many as are tried; it is in ``ended`` then."""
         tried: list[LawFit] = []
-        while len(tried) < self.effort.in_full:
+        while len(tried) < _IN_FULL:
             accepted = [one for one in self._accepted(fits, least) if one not in tried]
             if not accepted:
                 break
@@ -334,7 +318,7 @@ class _LawChoice:
         """Seek known effects on top of a law that was fitted to the end; kept where they help and it is still needed
         beside them."""
         model, _ = self.ended[one]
-        on_top = self.search.with_more_given(1, self.effort.listed).run(model).now
+        on_top = self.search.with_more_given(1, _LISTED).run(model).now
         found, gains = self.search.eliminate_backward(self.selection.before, on_top)
         if one.draft.name in gains and found.score < model.score:
             self.ended[one] = found, gains
@@ -369,22 +353,22 @@ class _LawChoice:
 
     def _fit_laws(self, base: Baseline) -> list[LawFit]:
         """Screen and fit the laws of all families on top of a model, best first. Where the best one leaves much, up to
-        ``of_a_family`` laws of its family are fitted to the end: a rough fit says little of which of them is right."""
-        effort, round_gain = self.effort, self.search.effort.round_share * base.explanation
+        ``_OF_A_FAMILY`` laws of its family are fitted to the end: a rough fit says little of which of them is right."""
+        round_gain = self.search.effort.round_share * base.explanation
         with ThreadPoolExecutor(self.search.workers) as pool:
             screened = self._screen_families(pool, base)
-            enough = effort.fit_share * max(self._screened_gain(base, screened[0][2]), 0.0) if screened else 0.0
+            enough = _FIT_SHARE * max(self._screened_gain(base, screened[0][2]), 0.0) if screened else 0.0
             worth = [each for each in screened if self._screened_gain(base, each[2]) > enough]
-            fits = self._fit_roughly(pool, base, _most_of_each(worth, effort.of_a_family)[: effort.fitted])
-            least = effort.refine_share * fits[0].fit.gain if fits else 0.0
-            near = [one for one in fits[: effort.refined] if one.fit.gain > least]
+            fits = self._fit_roughly(pool, base, _most_of_each(worth, _OF_A_FAMILY)[: _FITTED])
+            least = _REFINE_SHARE * fits[0].fit.gain if fits else 0.0
+            near = [one for one in fits[: _REFINED] if one.fit.gain > least]
             fits[: len(near)] = self._refine(pool, near, lambda fit: refine(base.score, fit, round_gain))
             best = min(fits, key=lambda one: one.score, default=None)
             if best is not None and 0 < best.fit.gain < (1 - IMITATION) * base.explanation:
                 alike = [one for one in fits if one.family is best.family]
                 more = [each for each in worth if each[0] is best.family
                         and all(each[1] is not one.draft for one in alike)]
-                alike += self._fit_roughly(pool, base, more[: effort.of_a_family - len(alike)])
+                alike += self._fit_roughly(pool, base, more[: _OF_A_FAMILY - len(alike)])
                 fits = [one for one in fits if one.family is not best.family] + self._refine(
                     pool, alike, lambda fit: refine_to_the_end(base.score, fit))
         return sorted(fits, key=lambda one: one.score)
@@ -395,7 +379,7 @@ class _LawChoice:
         context = LawContext(base.posterior, base.state)
         drafted = [(family, draft) for family in self.families.values() for draft in family.drafts(context)]
         screened = self._screen_all(pool, base, drafted)
-        best = list(_best_of_families(screened))[: self.effort.worth_narrowing]
+        best = list(_best_of_families(screened))[: _WORTH_NARROWING]
         narrower = [(family, more) for family, draft, _ in best for more in family.narrower(draft, context)]
         return sorted([*screened, *self._screen_all(pool, base, narrower)],
                       key=lambda each: -self._screened_gain(base, each[2]))

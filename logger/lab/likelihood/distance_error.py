@@ -36,6 +36,7 @@ _KNOT_S, _MOST_KNOTS = 1 / 3, 360
 is wrong by 0.1 m/s now more and now less leaves a tenth more than the noise. The most, a run of two minutes: a fit's
 time grows with the square of their number."""
 
+_SMOOTH_S = 1.0  # a car's speed changes by no more than a cubic over it: half a period of its bounce
 _HELD = 1e-6  # of its deviation, within which a number is held
 
 
@@ -349,28 +350,22 @@ def signals_off(errors: Sequence[RecordError], record: Sequence[Array]) -> dict[
 
 def _cubic_b_splines(pieces: int, count: int) -> csr_array:
     """Cubic B-splines with a knot after each of so many pieces, at ``count`` places from end to end (pieces + 3, n)."""
+    from scipy.interpolate import BSpline
     from scipy.sparse import csr_array
 
-    place = np.linspace(0, pieces, count)
-    first = np.minimum(place.astype(np.intp), pieces - 1)
-    u = place - first
-    weights = np.stack([(1 - u) ** 3, (3 * u - 6) * u**2 + 4, ((3 - 3 * u) * u + 3) * u + 1, u**3]) / 6
-    rows, columns = first + np.arange(4)[:, None], np.broadcast_to(np.arange(count), (4, count))
-    return csr_array((weights.ravel(), (rows.ravel(), columns.ravel())), (pieces + 3, count))
+    return csr_array(BSpline.design_matrix(np.linspace(0, pieces, count), np.arange(-3.0, pieces + 4), 3).T)
 
 
-def _roughness(run: Run, smooth_s: float = 1.0) -> Array:
+def _roughness(run: Run) -> Array:
     """The part of a run's distance (n,) that is rougher than a car drives [m]: what a moving cubic fit over this time
     leaves (A. Savitzky and M. Golay, Analytical Chemistry 36, 1964). The fit at an end serves up to there."""
-    half = min(round(smooth_s * run.rate_hz), run.count - 1) // 2
+    from scipy.signal import savgol_filter
+
+    half = min(round(_SMOOTH_S * run.rate_hz), run.count - 1) // 2
     if half < 2:
         return np.zeros(run.count)
-    powers = np.vander(np.linspace(-1, 1, 2 * half + 1), 4)
-    smooth = powers @ np.linalg.pinv(powers)
     way = run.distance_m - run.distance_m[0]
-    inside = np.convolve(way, smooth[half], "valid")
-    return np.asarray(way - np.concatenate([smooth[:half] @ way[: 2 * half + 1], inside,
-                                            smooth[half + 1 :] @ way[-2 * half - 1 :]]))
+    return np.asarray(way - savgol_filter(way, 2 * half + 1, 3))
 
 
 def _recorder_slopes(prediction: Array, rise: Array, run: Run) -> Array:

@@ -21,8 +21,8 @@ from logger.identification.noise_models import autocorrelation
 from logger.lab.residuals.breakdown import ModelResiduals
 from logger.runs import SENSOR
 from logger.simulation.virtual_drive import output_of
+from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.simulate import smooth_length
-from logger.vehicle.stepping import force_input
 
 Array = npt.NDArray[np.float64]
 Shape = Callable[[Array, Array], Array]
@@ -182,26 +182,17 @@ def _responses_at_sensor(residuals: ModelResiduals, shapes: Sequence[Shape],
                          highest_of_rate: float = 0.4) -> list[Array]:
     """Responses of the sensor to forces of these shapes in the suspensions, up to where the recorder's filter begins:
     (n, k) per run, the samples that count."""
-    car, structure = residuals.car, residuals.car.structure
-    n, w = len(structure.mass), len(structure.wheels)
-    push, a = np.zeros((2 * n, w)), np.zeros((2 * n, 2 * n))
-    if not structure.held:
-        push, a = force_input(structure)[:, :w], structure.state_space()[0]
-    found = []
+    car, structure, found = residuals.car, residuals.car.structure, []
     for run, response in zip(residuals.runs, residuals.responses, strict=True):
         length = smooth_length(run.count + round(4 * run.rate_hz))
-        f_hz = np.fft.rfftfreq(length, 1 / run.rate_hz)
+        f_hz = np.asarray(np.fft.rfftfreq(length, 1 / run.rate_hz), float)
         # Where there is no spring a steady force has no end.
         kept = np.flatnonzero((f_hz < highest_of_rate * run.rate_hz) & ((f_hz > 0) | bool(structure.stiffness.any())))
-        s = np.asarray(2j * np.pi * f_hz[kept], np.complex128)
         if structure.held:
-            transfer = np.ones((len(s), w), complex)
+            transfer = np.asarray(car.factor(np.asarray(2j * np.pi * f_hz[kept])))[:, None]
         else:
             output = car.output if run.facts.main.name == SENSOR else output_of(car, run.facts.main)
-            direct = output.row @ push[n:] if output.order == 2 else 0.0
-            states = np.linalg.solve(s[:, None, None] * np.eye(2 * n) - a, push[None])
-            transfer = np.einsum("n,fnw->fw", structure.output_matrices([output])[0][0], states) + direct
-        transfer *= car.factor(s)[:, None]
+            transfer = LinearCar(structure, output, sensors=car.sensors).by_force(f_hz[kept])
         columns = []
         for shape in shapes:
             force = np.fft.rfft(shape(response.travel_m, response.rate_mps), length, axis=0)

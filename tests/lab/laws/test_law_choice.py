@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from logger.lab.laws import learn
-from logger.lab.laws.learn import LawEffort, LawFit, _LawChoice
+from logger.lab.laws.learn import LawFit, _LawChoice
 from logger.lab.laws.refusals import Nearest, Refusal
 
 BEFORE, NOW = (SimpleNamespace(score=score, above=True, state=SimpleNamespace(names=names, effects=names))
@@ -78,7 +78,7 @@ def choice(world: World, monkeypatch: pytest.MonkeyPatch, *fits: LawFit) -> _Law
     selection: Any = SimpleNamespace(before=BEFORE, now=NOW)
     search: Any = SimpleNamespace(present=0)
     by_base: Any = [(base, [one for one in fits if one.base is base]) for base in (BEFORE, NOW)]
-    return _LawChoice(search, selection, {}, {}, LawEffort(), by_base)
+    return _LawChoice(search, selection, {}, {}, by_base)
 
 
 def test_a_refused_law_is_tried_on_no_other_model_and_is_no_rival(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,4 +1,4 @@
-"""What is read of a linear car that is given by its matrices: drive by drive, and wave by wave."""
+"""What is read of a car that is given by its matrices: drive by drive, and wave by wave."""
 
 from __future__ import annotations
 
@@ -6,10 +6,12 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from logger.profiles.track import WheelTracks
+from logger.profiles.track import Way, WheelTracks
 from logger.vehicle.compose import linear_outputs
+from logger.vehicle.laws import CornerLaws
 from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.simulate import FINE_RATE_HZ, Passage
+from logger.vehicle.stepping import Motion, Stepper
 from logger.vehicle.structure import Output, Structure, body_point
 from logger.vehicle.vehicle import AT_CENTRE_OF_GRAVITY, SensorPlace
 
@@ -26,3 +28,9 @@ def body_acceleration_response(structure: Structure, f_hz: object, speed_mps: ob
     """Body acceleration at the sensor per elevation under the front wheel [1/s2], at constant speeds."""
     car = LinearCar(structure, body_point(structure, sensor.ahead_m, sensor.left_m))
     return car.response(f_hz, speed_mps)  # type: ignore[arg-type]
+
+
+def march(structure: Structure, laws: Sequence[CornerLaws], elevation: np.ndarray, mean: np.ndarray, step_s: float,
+          way: Way | None = None) -> Motion:
+    """The motion from rest of a car with laws of its own, as ``Stepper.march``."""
+    return Stepper.of(structure, laws, step_s).march(elevation, mean, way)
