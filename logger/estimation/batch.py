@@ -452,7 +452,7 @@ def assess(
     exact = np.full(len(windows.iri_m_per_km), np.nan)
     road_effects = tuple(one.effect.name for one in effects if isinstance(one.effect, RoadEffect))
     if track is not None:
-        track = track.resurfaced(composed.structure.surface)
+        track = track.as_it_is(composed.structure.surface, ())
         exact = exact_iri(windows.edges_m, _driven(track, vehicle), track.spacing_m, track.start_m)
     limits = ErrorBound(car, gridded, window_m)
     level = local_level(np.where(np.isfinite(exact), exact, windows.iri_m_per_km), window_m)

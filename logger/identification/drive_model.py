@@ -42,7 +42,7 @@ from logger.identification.unknown_inputs import (
     is_input,
     read_input,
 )
-from logger.profiles.track import Alterations, Stance, Track, Way, WheelPath, WheelTracks, along_paths, as_it_is
+from logger.profiles.track import Alterations, Stance, Track, Way, WheelTracks, along_paths
 from logger.roads.iso8608 import displacement_psd
 from logger.runs import READING, Run
 from logger.simulation.virtual_drive import SimulatedRuns, steps_hz
@@ -111,7 +111,7 @@ class RoadInTime:
         if place not in self._known:
             if len(self._known) > _KEPT_PLACES:
                 self._known.clear()
-            track = as_it_is(self._track, (), structure.actuators)
+            track = self._track.as_it_is((), structure.actuators)
             self._known[place] = self._transforms(track.under_wheels(way, structure)[1])
         under = self._known[place]
         for obstacle in road.obstacles.values():
@@ -391,25 +391,15 @@ class _TrackWithObstacles:
 
     track: Track
     obstacles: tuple[Obstacle, ...]
+    acts_on = ()
 
-    def resurfaced(self, surface: Alterations) -> _TrackWithObstacles:
+    def as_it_is(self, surface: Alterations, actuators: Alterations) -> _TrackWithObstacles:
         """The road itself under the obstacles, which stay what they are."""
-        return replace(self, track=self.track.resurfaced(surface))
+        return replace(self, track=self.track.as_it_is(surface, actuators))
 
     def under_wheels(self, way: Way, stance: Stance) -> tuple[Array, Array]:
         """As ``WheelTracks``."""
-        patch_m = stance.contact_patch_m
-        obstacles = [ObstaclePath(one, patch_m) for one in self.obstacles]
-        return along_paths([_Sum([path, *obstacles]) for path in self.track.tire_paths(patch_m)], way, stance)
-
-
-@dataclass(frozen=True, eq=False)
-class _Sum:
-    """Paths on top of each other."""
-
-    paths: Sequence[WheelPath]
-
-    def step_means(self, distance_m: Array) -> tuple[Array, Array]:
-        """As ``WheelPath``."""
-        elevations, means = zip(*(one.step_means(distance_m) for one in self.paths), strict=True)
-        return sum(elevations[1:], elevations[0]), sum(means[1:], means[0])
+        parts = [self.track.under_wheels(way, stance),
+                 *(along_paths([ObstaclePath(one, stance.contact_patch_m)], way, stance) for one in self.obstacles)]
+        elevations, means = (np.sum(some, axis=0) for some in zip(*parts, strict=True))
+        return elevations, means

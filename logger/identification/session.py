@@ -25,7 +25,6 @@ from logger.identification.noise_models import Autoregressive, NoiseModel, RoadN
 from logger.identification.prediction_error_fit import Fit, FitOptions, fit, spread_starts
 from logger.identification.unknown_inputs import EACH, RoadInput, expanded
 from logger.identification.unknown_road.road_operator import RoadDrive
-from logger.profiles.track import Pushing
 from logger.runs import READING, SENSOR, Run, normalised_rms
 from logger.vehicle.effect import Chosen
 from logger.vehicle.named_parameters import Free
@@ -137,7 +136,7 @@ def drive_model(vehicle: Vehicle, effects: Sequence[Chosen], parameters: Sequenc
     """The model of these drives: in frequency where a car without effects drove, or stood on a rig that elevations
     alone moved, and its acceleration was measured. ValueError as ``DriveModel``."""
     benches = any(one.facts.main.name != SENSOR or one.begins_freely
-                  or (isinstance(one.track, Pushing) and one.track.acts_on) for one in records)
+                  or one.track.acts_on for one in records)
     if effects or benches or vehicle.model in OWN_NAMES:
         return SimulatedModel(vehicle, parameters, records, road, effects)
     return VehicleModel(vehicle, parameters, records, road)

@@ -142,9 +142,9 @@ class Excitation:
         """The parts that the forces act on."""
         return tuple(one.parts for one in self.forces)
 
-    def actuated(self, actuators: Alterations) -> Excitation:
-        """The same with the forces that act."""
-        if self.force_n is None:
+    def as_it_is(self, surface: Alterations, actuators: Alterations) -> Excitation:
+        """As ``WheelTracks``."""
+        if self.force_n is None or not actuators:
             return self
         acting = self.force_n
         for one in actuators:

@@ -14,14 +14,10 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, ClassVar, Protocol, runtime_checkable
+from typing import ClassVar, Protocol
 
 import numpy as np
 import numpy.typing as npt
-
-if TYPE_CHECKING:
-    pass
-
 
 Array = npt.NDArray[np.float64]
 
@@ -86,32 +82,13 @@ class WheelTracks(Protocol):
     def under_wheels(self, way: Way, stance: Stance) -> tuple[Array, Array]:
         """Elevations (M, w) under the wheels on a way, and their means (M - 1, w) over each step [m]."""
 
-
-@runtime_checkable
-class Profiled(WheelTracks, Protocol):
-    """A road of which a profile was written."""
-
-    def resurfaced(self, surface: Alterations) -> WheelTracks:
-        """The road itself, where it differs from its profile."""
-
-
-@runtime_checkable
-class Pushing(WheelTracks, Protocol):
-    """What pushes parts of a car besides."""
-
     @property
     def acts_on(self) -> tuple[tuple[str, ...], ...]:
-        """The parts that each of its forces acts on."""
+        """The parts of a car that each of the forces acts on, which push it besides; on roads there are none."""
 
-    def actuated(self, actuators: Alterations) -> WheelTracks:
-        """The forces that act, where they differ from their records."""
-
-
-def as_it_is(track: WheelTracks, surface: Alterations, actuators: Alterations) -> WheelTracks:
-    """What moves the wheels where a road differs from its profile, and a force from its record."""
-    if surface and isinstance(track, Profiled):
-        return track.resurfaced(surface)
-    return track.actuated(actuators) if actuators and isinstance(track, Pushing) else track
+    def as_it_is(self, surface: Alterations, actuators: Alterations) -> WheelTracks:
+        """The road itself, where it differs from its profile, and the forces that act, where they differ from their
+        records."""
 
 
 def along_paths(paths: Sequence[WheelPath], way: Way, stance: Stance) -> tuple[Array, Array]:
@@ -171,8 +148,10 @@ class Track:
     def under_wheels(self, way: Way, stance: Stance) -> tuple[Array, Array]:
         return along_paths(self.tire_paths(stance.contact_patch_m), way, stance)
 
-    def resurfaced(self, surface: Alterations) -> Track:
-        """The road itself, of which this is a profile that differs from it."""
+    def as_it_is(self, surface: Alterations, actuators: Alterations) -> Track:
+        """As ``WheelTracks``."""
+        if not surface:
+            return self
         known = self._resurfaced.get(surface)  # another thread may put others in its place at any time
         if known is None:
             columns = self.elevation_m.reshape(len(self.elevation_m), -1).T

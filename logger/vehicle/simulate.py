@@ -11,7 +11,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.dsp.filters import kaiser_half_length, low_pass_taps
-from logger.profiles.track import Pushing, Way, WheelTracks, as_it_is
+from logger.profiles.track import Way, WheelTracks
 from logger.vehicle.structure import Forces, Structure, pushed
 
 Array = npt.NDArray[np.float64]
@@ -156,7 +156,7 @@ class Passage:
                  structure.actuators, structure.on_base, structure.held)
         known = self._known.get(place)  # another thread may take it out at any time
         if known is None:
-            track = as_it_is(self.track, structure.surface, structure.actuators)
+            track = self.track.as_it_is(structure.surface, structure.actuators)
             elevation, mean = track.under_wheels(self._way, structure)
             heights = np.arange(elevation.shape[1]) < len(structure.wheels) * (not structure.held)
             level = elevation[0, 0] * heights
@@ -167,7 +167,7 @@ class Passage:
     @property
     def forces(self) -> Forces:
         """The parts that forces act on: on roads none."""
-        return self.track.acts_on if isinstance(self.track, Pushing) else ()
+        return self.track.acts_on
 
     def driven(self, structure: Structure) -> Structure:
         """The structure with the forces of this passage as its last inputs."""
