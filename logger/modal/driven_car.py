@@ -25,6 +25,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from logger.fitting.information_matrix import integrated_out
+from logger.fitting.levenberg_marquardt import minimise
 from logger.modal.mode import LARGEST_DAMPING_ERROR, LARGEST_FREQUENCY_ERROR, FoundMode, ModalResult, Rejected
 from logger.roads.iso8608 import HIGHEST_CPM
 from logger.vehicle.linear_car import AxleResponse
@@ -164,56 +166,59 @@ def fit_car(vehicle: Vehicle, pieces: Periodograms, rate_hz: float) -> CarFit:
     model = CarOnRoads(vehicle, pieces, rate_hz)
     x, loudest = model.start, float(np.log(pieces.power.mean()))
     for floor in floors:
-        x = _descend(model, np.append(x[:-1], loudest + floor), floor_is_known=True)[0]
+        x = _descend(model, np.append(x[:-1], loudest + floor), floor_is_known=True)[0].x
     starts = model.start, np.append(x[:-1], model.start[-1])
-    x, spectrum, information, _, settled = min((_descend(model, one) for one in starts), key=lambda found: found[3])
+    found, information, settled = min((_descend(model, one) for one in starts), key=lambda each: each[0].cost)
+    x = found.x
     if not settled:
         raise UnlikeCar("the fit of this car's parameters to the record does not converge")
-    bands_hz, share = _shares(pieces, spectrum)
+    bands_hz, share = _shares(pieces, found.spectrum)
     covariance = np.asarray(np.linalg.inv(information)[:-2, :-2], dtype=np.float64)
     return CarFit(model.car.vehicle_with(np.exp(x[:-2])), model.names, covariance, float(x[-2]), bands_hz, share)
 
 
-def _descend(model: CarOnRoads, start: Array, floor_is_known: bool = False) -> tuple[Array, Array, Array, float, bool]:
-    """Fisher's steps: where they end, the spectra (j, f) and the information there, what is to be least, and whether
-    they came to rest. The levels are eliminated from each step."""
-    pieces, power = model.pieces, model.pieces.power
-    x, (shapes, slopes), settled = start, model.shapes(start), False
-    level = np.log(power.mean(axis=1) / shapes.mean(axis=1))
+@dataclass(frozen=True, eq=False)
+class _Point:
+    """Spectra (j, f), the derivatives of their logarithms by the numbers (q, j, f) and by the logarithm of each one's
+    level (j, f), and minus the logarithm of the posterior density."""
 
-    def cost(x: Array, level: Array, shapes: Array) -> tuple[float, Array]:
-        spectrum = np.exp(level)[:, None] * shapes + np.exp(x[-1])
+    x: Array
+    spectrum: Array
+    slopes: Array
+    by_level: Array
+    cost: float
+
+
+def _descend(model: CarOnRoads, start: Array, floor_is_known: bool = False) -> tuple[_Point, Array, bool]:
+    """The most probable numbers (q,) and levels (j,), downhill from a start; the information (q, q) on the numbers
+    there, the levels integrated out; and whether it came to rest."""
+    pieces, power, q = model.pieces, model.pieces.power, len(start)
+
+    def evaluate(z: Array) -> _Point:
+        x = z[:q]
+        shapes, slopes = model.shapes(x)
+        level, noise = np.exp(z[q:])[:, None], np.exp(x[-1])
+        spectrum = level * shapes + noise
         whittle = float((pieces.worth * (np.log(spectrum) + power / spectrum)).sum())
-        return whittle + 0.5 * float(model.precision @ (x - model.start) ** 2), spectrum
+        by = np.concatenate([level * slopes, np.full((1, *shapes.shape), noise)]) / spectrum
+        return _Point(x, spectrum, by, level * shapes / spectrum,
+                      whittle + 0.5 * float(model.precision @ (x - model.start) ** 2))
 
-    here, spectrum = cost(x, level, shapes)
-    for _ in range(60):
-        own = np.exp(level)[:, None] * shapes / spectrum  # d ln S / d ln g of each piece
-        by = np.concatenate([np.exp(level)[:, None] * slopes / spectrum, (np.exp(x[-1]) / spectrum)[None]])
-        off = pieces.worth * (power / spectrum - 1)
-        across, alone = np.einsum("qjf,jf->qj", by, pieces.worth * own), (pieces.worth * own**2).sum(axis=1)
-        slope, slope_level = np.einsum("qjf,jf->q", by, off), (own * off).sum(axis=1)
-        information = np.einsum("qjf,rjf->qr", pieces.worth * by, by) - (across / alone) @ across.T
-        information += np.diag(model.precision)
-        wanted = slope - (across / alone) @ slope_level - model.precision * (x - model.start)
-        if floor_is_known:
-            wanted[-1], information[-1, :-1], information[:-1, -1] = 0.0, 0.0, 0.0
-        step = np.linalg.solve(information, wanted)
-        if settled := float(wanted @ step) < 1e-3:
-            break
-        level_step = (slope_level - across.T @ step) / alone
-        part = min(1.0, 0.3 / np.abs(step).max())
-        for _ in range(12):
-            tried, tried_level = x + part * step, level + part * level_step
-            shapes, slopes = model.shapes(tried)
-            there, spectrum = cost(tried, tried_level, shapes)
-            if there < here:
-                break
-            part /= 2
-        else:
-            break
-        x, level, here = tried, tried_level, there
-    return x, spectrum, information, here, settled
+    def normal_equations(z: Array, at: _Point, fresh: bool) -> tuple[Array, Array]:
+        off = pieces.worth * (power / at.spectrum - 1)
+        downhill = np.einsum("qjf,jf->q", at.slopes, off) - model.precision * (at.x - model.start)
+        across = np.einsum("qjf,jf->qj", at.slopes, pieces.worth * at.by_level)
+        own = np.einsum("qjf,rjf->qr", pieces.worth * at.slopes, at.slopes) + np.diag(model.precision)
+        return np.append(downhill, (at.by_level * off).sum(axis=1)), np.block([
+            [own, across], [across.T, np.diag((pieces.worth * at.by_level**2).sum(axis=1))]])
+
+    level = np.log(power.mean(axis=1) / model.shapes(start)[0].mean(axis=1))
+    low, high = np.full((2, q + len(level)), [[-np.inf], [np.inf]])
+    if floor_is_known:
+        low[q - 1] = high[q - 1] = start[-1]
+    found = minimise(np.append(start, level), evaluate, normal_equations, small_gain=lambda _at: 5e-4,
+                     most_rounds=60, keep_derivatives=False, low=low, high=high, longest_step=0.3)
+    return found.at, integrated_out(found.information, np.arange(q, len(low))), found.converged
 
 
 def _shares(pieces: Periodograms, spectrum: Array) -> tuple[Array, Array]:
