@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -56,8 +57,8 @@ def located(vehicle: Vehicle, record: Run, road: RoadInput, part: str) -> float:
         raise ValueError(f"{part}: expected a start_m, as {last_m - first_m:g} m are too many to look for it on")
     place = f"{part}.start_m"
     model = VehicleModel(vehicle, [Free(place, first_m, first_m - 1, last_m + 1, place=True)], [record], road)
-    without = replace(road, bump=None) if part == "bump" else replace(road, step=None)
-    bare = VehicleModel(vehicle, [], [record], without).predict(np.empty(0))[0]
+    without: Any = {part: None}
+    bare = VehicleModel(vehicle, [], [record], replace(road, **without)).predict(np.empty(0))[0]
     coarse = _best(model, record.kept_mps2, bare, np.linspace(first_m, last_m, max(count, 2)))
     return _best(model, record.kept_mps2, bare, coarse + apart_m * np.linspace(-1, 1, _REFINED))
 

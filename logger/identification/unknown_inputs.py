@@ -21,6 +21,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -141,8 +142,7 @@ class RoadInput:
     @property
     def obstacles(self) -> dict[str, Obstacle]:
         """Those there are, by name."""
-        both: tuple[tuple[str, Obstacle | None], ...] = (("bump", self.bump), ("step", self.step))
-        return {name: one for name, one in both if one is not None}
+        return {name: one for name in _NUMBERS if (one := getattr(self, name)) is not None}
 
 
 def input_names(road: RoadInput) -> list[str]:
@@ -185,14 +185,10 @@ def changed_input(road: RoadInput, values: Mapping[str, float], run: int) -> Roa
     for name, value in values.items():
         only, whole = run_and_name(name)
         part, _, leaf = whole.rpartition(".")
-        if only not in (None, run):
-            continue
-        if part == "bump" and road.bump is not None:
-            road = replace(road, bump=replace(road.bump, **{leaf: value}))
-        elif part == "step" and road.step is not None:
-            road = replace(road, step=replace(road.step, **{leaf: value}))
-        else:
-            road = replace(road, speed_scale=value)
+        if only in (None, run):
+            there: Any = getattr(road, part) if part else None
+            changed: Any = replace(there, **{leaf: value}) if part else value
+            road = replace(road, **{part or SPEED_SCALE: changed})
     return road
 
 

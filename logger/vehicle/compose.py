@@ -12,6 +12,7 @@ from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
 from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import numpy.typing as npt
@@ -154,39 +155,37 @@ def compose(vehicle: Vehicle, effects: Sequence[Chosen] = ()) -> Car:
     """A vehicle with its effects. ValueError when it lacks what its model or an effect needs."""
     given, front_m = vehicle.model, vehicle.front.cg_distance_m
     ordered = sorted(effects, key=lambda one: (one.effect.stage, one.effect.name))
-    for one in ordered:
-        if isinstance(one.effect, VehicleEffect):
-            vehicle = one.effect.vehicle(one.p, vehicle)
+
+    def of(kind: type[Any]) -> tuple[tuple[Any, SimpleNamespace], ...]:
+        return tuple((one.effect, one.p) for one in ordered if isinstance(one.effect, kind))
+
+    for effect, p in of(VehicleEffect):
+        vehicle = effect.vehicle(p, vehicle)
     structure = structure_of(vehicle)
     if (given, vehicle.model) == ("half_car", "full_car"):
         structure = replace(structure, sides=2)
-    surface, actuators = (tuple(_OfInput(one.effect, tuple(sorted(one.values.items())))
-                                for one in ordered if isinstance(one.effect, kind))
+    surface, actuators = (tuple(_OfInput(effect, tuple(sorted(vars(p).items()))) for effect, p in of(kind))
                           for kind in (RoadEffect, ActuatorEffect))
     if surface or actuators:
         structure = replace(structure, surface=surface, actuators=actuators)
-    for one in ordered:
-        if isinstance(one.effect, BodyEffect):
-            structure = one.effect.structure(one.p, structure)
-    forces = [one for one in ordered if isinstance(one.effect, ForceEffect)]
-    laws = []
+    for effect, p in of(BodyEffect):
+        structure = effect.structure(p, structure)
+    forces, laws = of(ForceEffect), []
     for axle in _axles(vehicle):
         corner = linear(axle.suspension_damping_n_s_per_m, axle is vehicle.rear, axle.suspension_stiffness_n_per_m)
         if vehicle.preload_n:
             corner = corner.with_spring(partial(_preload, vehicle.preload_n))
-        for one in forces:
-            assert isinstance(one.effect, ForceEffect)
-            corner = one.effect.laws(one.p, corner)
+        for effect, p in forces:
+            corner = effect.laws(p, corner)
         laws.append(corner)
     row = body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m).row
     around = (SensorEffect, DriveEffect, RecordEffect)
-    moving = [one for one in ordered if not isinstance(one.effect, around)]
-    body = ((vehicle, structure.sides, *(_key(one) for one in moving if one not in forces)), tuple(map(_key, forces)))
-    return Car(vehicle, structure, tuple(laws), row,
-               tuple(one for one in ordered if isinstance(one.effect, SensorEffect)),
-               tuple(one for one in ordered if isinstance(one.effect, DriveEffect)), bool(forces), body,
-               front_m - vehicle.front.cg_distance_m,
-               tuple(one for one in ordered if isinstance(one.effect, RecordEffect)))
+    plain, bent = ([one for one in ordered if isinstance(one.effect, ForceEffect) is is_bent
+                    and not isinstance(one.effect, around)] for is_bent in (False, True))
+    body = ((vehicle, structure.sides, *map(_key, plain)), tuple(map(_key, bent)))
+    sensors, drives, records = (tuple(one for one in ordered if isinstance(one.effect, kind)) for kind in around)
+    return Car(vehicle, structure, tuple(laws), row, sensors, drives, bool(forces), body,
+               front_m - vehicle.front.cg_distance_m, records)
 
 
 def _key(one: Chosen) -> Hashable:

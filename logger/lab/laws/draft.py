@@ -44,7 +44,7 @@ _AXLES = {"front": "if laws.rear:", "rear": "if not laws.rear:"}
 class Draft:
     """A law before it is fitted.
 
-    family       name of the family that it is of
+    family       that it is of
     kind         name of the class of ``logger.vehicle.effect`` that it is made from
     title        in a few words
     parameters   its numbers
@@ -62,7 +62,7 @@ class Draft:
     words        the other lines of its class (``needs_road = True``)
     """
 
-    family: str
+    family: Family
     kind: str
     title: str
     parameters: tuple[Parameter, ...]
@@ -81,7 +81,7 @@ class Draft:
     @property
     def name(self) -> str:
         """Name of the effect."""
-        return "_".join([LEARNED + self.family, *([self.axle] if self.axle else [])])
+        return "_".join([LEARNED + self.family.name, *([self.axle] if self.axle else [])])
 
     @property
     def strengths(self) -> tuple[str, ...]:
@@ -248,7 +248,7 @@ class Family(ABC):
     def draft(self, parameters: tuple[Parameter, ...], method: str, functions: str = "", **more: Any) -> Draft:
         """A law of this family; ``more`` as of ``Draft``, what is not said is the family's."""
         said = {name: getattr(self, name) for name in ("kind", "title", "source", "signature", "shown_by")}
-        return Draft(family=self.name, parameters=parameters, method=method, functions=functions, **{**said, **more})
+        return Draft(family=self, parameters=parameters, method=method, functions=functions, **{**said, **more})
 
     def narrower(self, draft: Draft, context: LawContext) -> list[Draft]:
         """Variations of a law that promises something: a force at one axle alone."""

@@ -77,7 +77,7 @@ def _gauss_newton_trial(base: Baseline, draft: Draft, values: dict[str, float]) 
 
 
 Progress = Callable[[str], None]
-_ScreenedLaw = tuple[Family, Draft, Screened]
+_ScreenedLaw = tuple[Draft, Screened]
 
 DECISIVE = 2 * INDISTINGUISHABLE
 """What a law has to gain over known effects that explain all: twice what distinguishes two of them."""
@@ -99,7 +99,6 @@ class LawFit:
     base    the model that it was added to
     """
 
-    family: Family
     draft: Draft
     base: Baseline
     fit: CandidateFit
@@ -128,7 +127,6 @@ class Law:
     nearest     the known effect that gains most in its place; None: none gains anything
     """
 
-    family: Family
     draft: Draft
     one: Chosen
     effects: tuple[Chosen, ...]
@@ -298,7 +296,7 @@ class _LawChoice:
             model, gains = self.ended[best]
             if best.draft.name not in gains or model.score > least:
                 continue
-            if why := refusal(best.family, best.draft, model):
+            if why := refusal(best.draft, model):
                 self.refused[best.name] = why
                 continue
             return best
@@ -328,16 +326,15 @@ class _LawChoice:
         """The law that was chosen, in the model that was fitted to the end."""
         one, *_ = (one for one in model.state.effects if one.effect.name == best.draft.name)
         effects = tuple(other for other in model.state.effects[self.search.present:] if other is not one)
-        rivals = tuple(_best_of_each(other for other in others if other.family is not best.family
+        rivals = tuple(_best_of_each(other for other in others if other.draft.family is not best.draft.family
                                      and other.score < best.score + INDISTINGUISHABLE))
         before, now = self.selection.before.score, self.selection.now.score
-        return Law(best.family, best.draft, one, effects, model.state, gain, before - now, before - model.score, rivals,
-                   nearest)
+        return Law(best.draft, one, effects, model.state, gain, before - now, before - model.score, rivals, nearest)
 
     def _fit_in_full(self, best: LawFit) -> tuple[Baseline, dict[str, float]]:
         """The model with a law fitted to the end, without known effects that it needs no more, and the gains of what is
         left of both."""
-        self.search.progress(f"{best.family.title}: fitting the car with it")
+        self.search.progress(f"{best.draft.family.title}: fitting the car with it")
         found = best.fit.found
         fitted = Baseline.of(fit_to_the_end(align(found.posterior, found.state), found.numbers))
         return self.search.eliminate_backward(self.selection.before, fitted)
@@ -357,19 +354,20 @@ class _LawChoice:
         round_gain = self.search.effort.round_share * base.explanation
         with ThreadPoolExecutor(self.search.workers) as pool:
             screened = self._screen_families(pool, base)
-            enough = _FIT_SHARE * max(self._screened_gain(base, screened[0][2]), 0.0) if screened else 0.0
-            worth = [each for each in screened if self._screened_gain(base, each[2]) > enough]
+            enough = _FIT_SHARE * max(self._screened_gain(base, screened[0][1]), 0.0) if screened else 0.0
+            worth = [each for each in screened if self._screened_gain(base, each[1]) > enough]
             fits = self._fit_roughly(pool, base, _most_of_each(worth, _OF_A_FAMILY)[: _FITTED])
             least = _REFINE_SHARE * fits[0].fit.gain if fits else 0.0
             near = [one for one in fits[: _REFINED] if one.fit.gain > least]
             fits[: len(near)] = self._refine(pool, near, lambda fit: refine(base.score, fit, round_gain))
             best = min(fits, key=lambda one: one.score, default=None)
             if best is not None and 0 < best.fit.gain < (1 - IMITATION) * base.explanation:
-                alike = [one for one in fits if one.family is best.family]
-                more = [each for each in worth if each[0] is best.family
-                        and all(each[1] is not one.draft for one in alike)]
+                family = best.draft.family
+                alike = [one for one in fits if one.draft.family is family]
+                more = [each for each in worth if each[0].family is family
+                        and all(each[0] is not one.draft for one in alike)]
                 alike += self._fit_roughly(pool, base, more[: _OF_A_FAMILY - len(alike)])
-                fits = [one for one in fits if one.family is not best.family] + self._refine(
+                fits = [one for one in fits if one.draft.family is not family] + self._refine(
                     pool, alike, lambda fit: refine_to_the_end(base.score, fit))
         return sorted(fits, key=lambda one: one.score)
 
@@ -377,18 +375,18 @@ class _LawChoice:
         """Screenings of the laws of all families on top of a model, the largest gain first. The law with the largest
         gain of a family is varied."""
         context = LawContext(base.posterior, base.state)
-        drafted = [(family, draft) for family in self.families.values() for draft in family.drafts(context)]
+        drafted = [draft for family in self.families.values() for draft in family.drafts(context)]
         screened = self._screen_all(pool, base, drafted)
-        best = list(_best_of_families(screened))[: _WORTH_NARROWING]
-        narrower = [(family, more) for family, draft, _ in best for more in family.narrower(draft, context)]
+        best = _most_of_each(screened, 1)[:_WORTH_NARROWING]
+        narrower = [more for draft, _ in best for more in draft.family.narrower(draft, context)]
         return sorted([*screened, *self._screen_all(pool, base, narrower)],
-                      key=lambda each: -self._screened_gain(base, each[2]))
+                      key=lambda each: -self._screened_gain(base, each[1]))
 
     def _fit_roughly(self, pool: ThreadPoolExecutor, base: Baseline, screened: Sequence[_ScreenedLaw]) -> list[LawFit]:
         """Rough fits of screened laws, best first."""
         self.search.progress(f"fitting {len(screened)} laws")
-        fits = pool.map(lambda each: fit_roughly(base.score, base, each[2])[0], screened)
-        laws = [LawFit(family, draft, base, fit) for (family, draft, _), fit in zip(screened, fits, strict=True)]
+        fits = pool.map(lambda each: fit_roughly(base.score, base, each[1])[0], screened)
+        laws = [LawFit(draft, base, fit) for (draft, _), fit in zip(screened, fits, strict=True)]
         return sorted(laws, key=lambda one: one.score)
 
     def _refine(self, pool: ThreadPoolExecutor, fits: Sequence[LawFit], how: Callable[[CandidateFit], CandidateFit]
@@ -397,15 +395,15 @@ class _LawChoice:
         self.search.progress(f"refining {len(fits)} laws")
         return [replace(one, fit=fit) for one, fit in zip(fits, pool.map(lambda one: how(one.fit), fits), strict=True)]
 
-    def _screen_all(self, pool: ThreadPoolExecutor, base: Baseline, drafted: Sequence[tuple[Family, Draft]]
+    def _screen_all(self, pool: ThreadPoolExecutor, base: Baseline, drafted: Sequence[Draft]
                   ) -> list[_ScreenedLaw]:
         """Screenings of laws on top of a model, the largest gain first."""
         found = []
-        for done, ((family, draft), one) in enumerate(zip(drafted, pool.map(
-                lambda pair: screen_law(base, pair[1], self.search.misalignment), drafted), strict=True), 1):
+        for done, (draft, one) in enumerate(zip(drafted, pool.map(
+                lambda each: screen_law(base, each, self.search.misalignment), drafted), strict=True), 1):
             self.search.progress(f"screened {done} of {len(drafted)} laws")
-            found.append((family, draft, one))
-        return sorted(found, key=lambda each: -self._screened_gain(base, each[2]))
+            found.append((draft, one))
+        return sorted(found, key=lambda each: -self._screened_gain(base, each[1]))
 
     def _screened_gain(self, base: Baseline, one: Screened) -> float:
         """Gain in evidence by screening, less the cost of a law's numbers."""
@@ -425,8 +423,9 @@ class _LawChoice:
     def _nearest(self, model: Baseline, best: LawFit, law_gain: float) -> Nearest | None:
         """The known effect that gains most in the place of the law, of those related to its family."""
         without = self.search.without(model, best.draft.name)
-        names = [name for name in best.family.related_effects if name in self.known and name not in without.state.names]
-        self.search.progress(f"what known effect comes near {best.family.title}")
+        names = [name for name in best.draft.family.related_effects
+                 if name in self.known and name not in without.state.names]
+        self.search.progress(f"what known effect comes near {best.draft.family.title}")
         with ThreadPoolExecutor(self.search.workers) as pool:
             tries = list(pool.map(lambda name: fit_roughly(
                 without.score, without, screen(without, self.known[name], [self.search.misalignment]))[0], names))
@@ -438,22 +437,13 @@ class _LawChoice:
         return Nearest(nearest.chosen, nearest.gain, law_gain)
 
 
-def _best_of_families(screened: Sequence[_ScreenedLaw]) -> list[_ScreenedLaw]:
-    """The first law of each family, of laws in order."""
-    found: dict[str, _ScreenedLaw] = {}
-    for each in screened:
-        found.setdefault(each[0].name, each)
-    return list(found.values())
-
-
-def _most_of_each(screened: Sequence[_ScreenedLaw], most: int
-                  ) -> list[_ScreenedLaw]:
+def _most_of_each(screened: Sequence[_ScreenedLaw], most: int) -> list[_ScreenedLaw]:
     """The first laws of each family, at most so many."""
     counts: Counter[str] = Counter()
     found = []
     for each in screened:
-        counts[each[0].name] += 1
-        if counts[each[0].name] <= most:
+        counts[each[0].family.name] += 1
+        if counts[each[0].family.name] <= most:
             found.append(each)
     return found
 
@@ -462,5 +452,5 @@ def _best_of_each(fits: Iterable[LawFit]) -> list[LawFit]:
     """The best law of each family, best first."""
     found: dict[str, LawFit] = {}
     for one in fits:
-        found.setdefault(one.family.name, one)
+        found.setdefault(one.draft.family.name, one)
     return list(found.values())

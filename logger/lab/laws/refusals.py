@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from logger.lab.laws.draft import Draft, Family
+from logger.lab.laws.draft import Draft
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.signals import JointBands
 from logger.lab.likelihood.standard_errors import deviations_from_null, standard_errors
@@ -67,7 +67,7 @@ class Refusal:
     known: Nearest | None = None
 
 
-def refusal(family: Family, draft: Draft, model: Baseline) -> Refusal | None:
+def refusal(draft: Draft, model: Baseline) -> Refusal | None:
     """Why a law in a model that was fitted with it says nothing; None where it says something."""
     errors = standard_errors(model.linear)
     one = next(each for each in errors.effects if each.effect.name == draft.name)
@@ -75,7 +75,7 @@ def refusal(family: Family, draft: Draft, model: Baseline) -> Refusal | None:
         return Refusal(draft.title, f"its strength is within {SIGMA:g} standard errors of doing nothing")
     if why := _beyond(model.posterior, one):
         return Refusal(draft.title, why)
-    if family.is_straight(draft, one, SIGMA):
+    if draft.family.is_straight(draft, one, SIGMA):
         return Refusal(draft.title, f"it is a straight line within {SIGMA:g} standard errors, as a number of the car "
                                     "already is")
     return None

@@ -39,10 +39,10 @@ class World:
 
 def law(name: str, score: float, base: Any = BEFORE) -> LawFit:
     """A law that was fitted."""
-    draft = SimpleNamespace(name=name, variant="", parameters=(), title=name)
     family: Any = SimpleNamespace(name=name, title=name)
+    draft = SimpleNamespace(name=name, variant="", parameters=(), title=name, family=family)
     fit: Any = SimpleNamespace(found=SimpleNamespace(score=score), gain=base.score - score)
-    return LawFit(family, draft, base, fit)  # type: ignore[arg-type]
+    return LawFit(draft, base, fit)  # type: ignore[arg-type]
 
 
 def choice(world: World, monkeypatch: pytest.MonkeyPatch, *fits: LawFit) -> _LawChoice:
@@ -59,7 +59,7 @@ def choice(world: World, monkeypatch: pytest.MonkeyPatch, *fits: LawFit) -> _Law
         score = world.on_top.get(one.draft.name, one.score)
         _choice.ended[one] = SimpleNamespace(**vars(model) | {"score": score}), gains
 
-    def refused(_family: Any, draft: Any, _model: Any) -> Refusal | None:
+    def refused(draft: Any, _model: Any) -> Refusal | None:
         return Refusal(draft.name, "says nothing") if draft.name in world.nothing else None
 
     def nearest(_choice: _LawChoice, model: Any, _best: LawFit, gain: float) -> Nearest | None:

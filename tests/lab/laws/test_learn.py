@@ -83,7 +83,7 @@ def test_a_damping_by_the_square_of_the_rate_is_learned() -> None:
     found = learned([chosen(QuadraticDamping(), {})], rougher=2.0)
     law = found.law
     assert law is not None
-    assert law.family.name == "force_by_rate" and not law.effects and not law.draft.axle
+    assert law.draft.family.name == "force_by_rate" and not law.effects and not law.draft.axle
     assert law.one.values["power_ratio"] == pytest.approx(2.0, abs=0.05)
     true_n = SQUARE_N_S2_PER_M2 * law.draft.reference**2
     assert law.one.values["force_n"] == pytest.approx(true_n, rel=0.1)
@@ -98,7 +98,7 @@ class Straight(Family):
         self.family, self.shown_by = family, family.shown_by
 
     def drafts(self, context: LawContext) -> list[Draft]:
-        return [replace(draft, family=self.name) for draft in self.family.drafts(context)]
+        return [replace(draft, family=self) for draft in self.family.drafts(context)]
 
     def is_straight(self, draft: Draft, found: Chosen, sigma: float) -> bool:
         return True
@@ -114,7 +114,7 @@ def test_the_law_after_one_that_is_refused_is_learned() -> None:
     few = {name: EFFECTS[name] for name in FEW[:2]}
     law = learn(posterior, few, {one.name: one for one in (Straight(right), right)}, EFFECTS, (), progress.append).law
     assert f"{Straight.title}: fitting the car with it" in progress
-    assert law is not None and law.family is right
+    assert law is not None and law.draft.family is right
 
 
 class Hum(RecordEffect):
@@ -129,7 +129,7 @@ class Hum(RecordEffect):
 @pytest.mark.slow
 def test_a_tone_is_learned_that_is_quieter_than_the_noise() -> None:
     law = learned([chosen(Hum(), {})], rougher=2.0).law
-    assert law is not None and law.family.name == "hum"
+    assert law is not None and law.draft.family.name == "hum"
     assert law.one.values["frequency_hz"] == pytest.approx(HUM_HZ, abs=0.01)
 
 

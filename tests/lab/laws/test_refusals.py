@@ -121,7 +121,7 @@ def test_a_fitted_law_is_refused_for_its_own_numbers(added: float, hz: float, wh
     posterior = posterior_of(secret_runs([chosen(draft.effect, values)], lasts_s=8.0))
     start = chosen(draft.effect, values | {"added_ratio": max(added, 0.01)})
     begun = posterior.state_at((start,), posterior.start().logs)
-    refused = refusal(FACTOR, draft, Baseline.of(fit(LinearModel(posterior, begun))))
+    refused = refusal(draft, Baseline.of(fit(LinearModel(posterior, begun))))
     assert (refused.why if refused else "").find(why) >= 0 and bool(refused) == bool(why)
 
 
