@@ -1,13 +1,4 @@
-"""The response of a linear car, of its structure alone and with the linear effects.
-
-A linear car by frequency: M, C and K at s, what outputs make of the road under the wheels, and how that depends on
-the car's numbers.
-
-With the dynamic stiffness D(s) = s2 M + s C + K, a road z under the wheels moves the coordinates by q, D q = R z, and a
-sensor on the body reads s2 r q. D is symmetric, so one more solution, w of D w = s2 r, gives the derivative of the
-reading by any number of the car: s2 dr q + w (dR z - dD q).
-
-What a sensor on a linear car reads of a road, wave by wave, with effects that are linear or have stand-ins.
+"""What a sensor on a linear car reads of a road, wave by wave, and how that depends on the car's numbers.
 
 A car whose laws are linear answers each wave of the road with a factor, exactly: springs, dampers and tires are
 impedances there, a mount in series with a damper too, and what lies between the body and the recorder is a factor of
@@ -17,6 +8,9 @@ what the laws add at the suspensions Z(s) and at the tires Y(s), the travel J an
     (D + J' Z J + W' Y W) q = (R + W' Y) z
 
 A force by all that moves at a wheel is a row of factors on q and z instead, and acts along J, W or their sum.
+
+A sensor on the body reads s2 r q. D is symmetric, so where the matrices hold all, one more solution, w of D w = s2 r,
+gives the derivative of the reading by any number of the car: s2 dr q + w (dR z - dD q).
 """
 
 from __future__ import annotations

@@ -1,21 +1,13 @@
-"""The quarter car, the half car and the full car, by the names that vehicle files call them.
+"""The models of a car by the names that vehicle files call them.
 
-The quarter car: a body on one wheel (Eq 4.3 to 4.9 of Blum 2015).
+The quarter car is a body on one wheel (Eq 4.3 to 4.9 of Blum 2015); the half car one side of the body on a front and a
+rear wheel (Eq 4.12 to 4.35). The dissertation's Eq 4.23 to 4.25 carry wrong signs in the pitch row; here everything
+follows from M, C and K of Eq 4.12 (its Appendix A.2), which do not.
 
-The half car: one side of the body on a front and a rear wheel (Eq 4.12 to 4.35 of Blum 2015).
-
-The matrices are M, C and K of Eq 4.12. The dissertation's Eq 4.23 to 4.25 carry wrong signs in the pitch row;
-here everything follows from M, C and K (its Appendix A.2), which do not.
-
-The full car: the whole body on four wheels, with seven degrees of freedom.
-
-A half car sees one track and knows nothing of the other, but the two tracks of a road differ and tilt the car. The
-full car adds roll: the half car's equations (Eq 4.12 of Blum 2015) with a second side, and an anti-roll bar on each
-axle, which resists only what the two suspensions of the axle do against each other. With x the extension of a
-suspension and b the track width, the axle rolls against the body by (x_left - x_right) / b, and the bar stores
-1/2 k ((x_left - x_right) / b)^2.
-
-The models of a car by the names that vehicle files call them.
+A half car sees one track and knows nothing of the other, but the two tracks of a road differ and tilt the car. The full
+car adds roll: the half car's equations with a second side, and an anti-roll bar on each axle, which resists only what
+the two suspensions of the axle do against each other. With x the extension of a suspension and b the track width, the
+axle rolls against the body by (x_left - x_right) / b, and the bar stores 1/2 k ((x_left - x_right) / b)^2.
 """
 
 from __future__ import annotations

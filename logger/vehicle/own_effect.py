@@ -1,17 +1,9 @@
-"""Effects that a user wrote: how they are read, and what they may do.
+"""Effects that a user wrote: whether they keep to what effects are, and what they answer wherever they are asked.
 
-A user's own effect, watched wherever it is asked.
-
-Problem: whatever a user's effect answers is used far from it, in the middle of a fit that asks at values nobody tried:
-an exception, an array of another shape or one number that is none end there in a complaint about something else.
-Solution: an effect that asks the user's own and looks at every answer, those of the laws that it gives too. What is
-wrong is raised where the user's file can be blamed for it.
-
-Whether a user's own effect keeps to what effects are, before anything relies on it.
-
-Problem: an effect that a user writes is met first in the middle of a simulation or a fit, where a forgotten word or a
-law that answers with one number for a thousand travels ends in a complaint about something else. Solution: it is
-looked through when it is read, and tried once on the user's car.
+Problem: an effect that a user writes is met first in the middle of a simulation or a fit that asks at values nobody
+tried, where a forgotten word, an exception, an array of another shape or one number that is none end in a complaint
+about something else. Solution: it is looked through when it is read, and tried once on the user's car; and every answer
+of its, those of the laws that it gives too, is looked at. What is wrong is raised where the user's file can be blamed.
 """
 
 from __future__ import annotations

@@ -1,25 +1,17 @@
 """The loop that steps a car with its laws, compiled where numba is there, and how it asks laws in Python.
 
-A law that is written in Python, asked number by number from a compiled loop.
+It is plain numbers and arrays, so that it can be compiled (the ``lab`` extra), at its first use, and kept on disk; else
+it runs as it stands. What the laws ask of a car, the travel and rate of each suspension and the deflection of each tire
+and its rate (the ``seen``), is carried through a step beside the state. So the forces at the end of a step are tried on
+these few numbers, and the state is taken on once. Matrices stand transposed and are as wide as the processor likes it.
 
-Problem: a force by whatever moves at a wheel, with states of its own, fits in no table, and the loop that steps a car
-is compiled once and kept on disk, before anybody wrote that law. Solution: each law is compiled by itself, once, to
-machine code with one and the same signature; the loop knows it by its address. Without numba the address is a number
-in a list, and the law runs as it stands.
-
-A law's functions are distinguished by their code, so they get all that they need as ``p`` and hold nothing else.
-
-The loop of ``stepping``: plain numbers and arrays, so that it can be compiled.
-
-It is compiled when numba is there (the ``lab`` extra), at its first use, and kept on disk; else it runs as it stands.
-
-What the laws ask of a car, the travel and rate of each suspension and the deflection of each tire and its rate (the
-``seen``), is carried through a step beside the state. So the forces at the end of a step are tried on these few
-numbers, and the state is taken on once. Matrices stand transposed and are as wide as the processor likes it.
-
-States of laws (``MotionLaw``) are stepped by an exponential midpoint rule, each with its own decay, the motion at the
-mean of both ends of the step: exact for a state that decays towards something, however quickly (M. Hochbruck, A.
-Ostermann, Exponential integrators, Acta Numerica 19, 2010, 2.3).
+Problem: a force by whatever moves at a wheel, with states of its own (``MotionLaw``), fits in no table, and the loop is
+compiled before anybody wrote that law. Solution: each law is compiled by itself, once, to machine code with one and the
+same signature; the loop knows it by its address. Without numba the address is a number in a list. A law's functions are
+distinguished by their code, so they get all that they need as ``p`` and hold nothing else. Their states are stepped by
+an exponential midpoint rule, each with its own decay, the motion at the mean of both ends of the step: exact for a
+state that decays towards something, however quickly (M. Hochbruck, A. Ostermann, Exponential integrators, Acta Numerica
+19, 2010, 2.3).
 """
 
 from __future__ import annotations

@@ -1,16 +1,7 @@
-"""A car as matrices, and their exact step in time.
+"""A car as linear equations of motion, their exact step in time, and what can be asked of them.
 
-Linear equations in time, stepped exactly and in blocks.
-
-A car on a road is x' = A x + B u. Between two samples the input is known (a straight line), so the step can be taken
-without error through the matrix exponential. Stepping sample by sample in Python is slow; but a stretch of steps can be
-taken for all stretches of a drive at once, and only the state at the end of each has to be carried on.
-
-A car as linear equations of motion, and what can be asked of them.
-
-Every linear model of a car is the same problem with other matrices, so each model file states only its masses and
-where its wheels stand, and this one builds the matrices and asks the questions. Conventions, stated once for all
-models:
+Every linear model of a car is the same problem with other matrices, so each model states only its masses and where its
+wheels stand; here the matrices are built, and stepped. Conventions, stated once for all models:
 
     M q'' + C q' + K q = R z
 
@@ -24,6 +15,10 @@ models:
 - forces from outside are more inputs beside z, with columns of R of their own (``pushed``);
 - the car drives forward: a wheel that stands ``behind_m`` behind the front wheel meets the road ``behind_m / speed``
   later (Eq 4.10 and 4.11 of Blum 2015), and each tire averages the road over the contact patch.
+
+Between two samples the input is a straight line, so that a step is taken without error through the matrix exponential.
+Stepping sample by sample in Python is slow; but a stretch of steps can be taken for all stretches of a drive at once,
+and only the state at the end of each has to be carried on.
 """
 
 from __future__ import annotations
