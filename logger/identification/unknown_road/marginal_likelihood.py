@@ -79,20 +79,22 @@ class ResponseCar(Protocol):
         """Readings per elevation under each axle (x, f) with these values (p,), and their derivatives (p, x, f)."""
 
 
+_SOLVED, _FISHER_PROBES = 3e-4, 2
+"""What is left of a set of equations when it counts as solved, of what it began with; and simulated drives that the
+information is a mean over."""
+
+
 @dataclass(frozen=True)
 class Options:
     """How to fit.
 
     waviness         of every road, or where it starts
     free_waviness    find it, one for each road
-    place_off_m      how far the places of two drives over one road may be off; 0: they are exact
+    place_off_m      how far the places of two drives over one road may be off, more than 0
     scale_off        how far their distances may be off beyond that, as a share; 0: they are exact
     probes           simulated drives that slopes are compared with on the way
     last_probes      and at the end, where what they have in common is an error of the estimate
     seed             of them
-    most_steps       of Fisher's
-    solved           what is left of a set of equations when it counts as solved, of what it began with
-    fisher_probes    simulated drives that the information is a mean over
     refuse           raise NotIdentifiable; otherwise ``RoadFit.verdict`` says it
     """
 
@@ -101,9 +103,6 @@ class Options:
     place_off_m: float = 3.0
     probes: int = 10
     seed: int = 1
-    most_steps: int = 30
-    solved: float = 3e-4
-    fisher_probes: int = 2
     refuse: bool = True
     scale_off: float = 0.0
     last_probes: int = 40
@@ -241,7 +240,7 @@ class UnknownRoad:
               ) -> tuple[Array, Array, tuple[float, float]]:
         """Slopes of the likelihood (m,), the information (m, m) or zeros, and squares unexplained and measured.
 
-        fisher_probes    in place of that of the options
+        fisher_probes    simulated drives that the information is a mean over; None: two
         """
         model = self.model(at)
         readings = []
@@ -257,7 +256,7 @@ class UnknownRoad:
         count = slopes.shape[1]
         known = np.zeros((count, count))
         if information:
-            probes = slice(1, 1 + (fisher_probes or self._options.fisher_probes))
+            probes = slice(1, 1 + (fisher_probes or _FISHER_PROBES))
             known = self._information(model, white[probes], [one[probes] for one in rest])
         return slopes[0] - slopes[1:].mean(axis=0), known, (left, whole)
 
@@ -283,10 +282,7 @@ class UnknownRoad:
         columns = [*by_car.T, 0.5 * (white**2).sum(axis=1)]
         if self._options.free_waviness:
             columns.append(0.5 * (white * self._tilted(white)).sum(axis=1))
-        if self._options.place_off_m:
-            columns += by_place[1:]
-        columns += by_scale[1:]
-        return np.stack([*columns, by_noise], axis=1)
+        return np.stack([*columns, *by_place[1:], *by_scale[1:], by_noise], axis=1)
 
     def _information(self, model: DrivesModel, white: Array, rest: list[Array]) -> Array:
         """Half of E[(dC u)' inv(C) (dC u)] (m, m), over whitened readings of probes.
@@ -312,7 +308,7 @@ class UnknownRoad:
         if self._options.free_waviness:
             roads.append(self._tilted(white))
         moves = [(number, size, lever) for size, lever, free in
-                 ((1.0, False, self._options.place_off_m), (HUNDREDTH, True, self._options.scale_off)) if free
+                 ((1.0, False, True), (HUNDREDTH, True, self._options.scale_off)) if free
                  for number in range(1, drives)]
         roads += [size * self.crossings[number].back(rest[number], model.waves[number] * slope,
                                                      model.responses[number], lever) for number, size, lever in moves]
@@ -355,7 +351,7 @@ class UnknownRoad:
 
     def _solve(self, model: DrivesModel, readings: Sequence[Array], nearby: Preconditioner | None = None,
                rounds: int | None = None) -> tuple[Array, list[Array], int]:
-        return solve(model, readings, self.grid.count, self._options.solved, rounds, nearby)
+        return solve(model, readings, self.grid.count, _SOLVED, rounds, nearby)
 
 
 def _highest_cpm(drive: RoadDrive) -> float:
@@ -394,8 +390,8 @@ class Roads:
         ends = [0]
         for number, drives in enumerate(roads, 1):
             own = [GD_N0, *[WAVINESS] * options.free_waviness]
-            own += [f"drive{drive}.{what}" for what, off in ((OFFSET, options.place_off_m), (SCALE, options.scale_off))
-                    for drive in range(2, len(drives) + 1) if off]
+            own += [f"drive{drive}.{what}" for what in (OFFSET, *[SCALE] * (options.scale_off > 0))
+                    for drive in range(2, len(drives) + 1)]
             self.names += [f"road{number}.{one}" for one in own]
             ends.append(len(self.names))
         self.names.append(NOISE)
@@ -432,8 +428,7 @@ class Roads:
         part, drives = self.parts[road], len(self.roads[road].drives)
         waviness = float(numbers[part[1]]) if self.options.free_waviness else self.options.waviness
         offsets_m, scales = np.zeros(drives), np.ones(drives)
-        if self.options.place_off_m:
-            offsets_m[1:] = numbers[self.places(road)]
+        offsets_m[1:] = numbers[self.places(road)]
         if self.options.scale_off:
             scales[1:] += HUNDREDTH * numbers[part[self.are(SCALE)[part]]]
         return RoadState(values, float(numbers[part[0]]), waviness, offsets_m, float(np.exp(numbers[-1])), scales)

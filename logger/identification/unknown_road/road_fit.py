@@ -31,7 +31,7 @@ Array = npt.NDArray[np.float64]
 
 _WAVINESS = (1.0, 3.5)  # of the flattest and the steepest road there is
 # How long a step may be; how many standard errors from the end the end is reached.
-_LONGEST_STEP, _CLOSE = 0.3, 0.02
+_LONGEST_STEP, _CLOSE, _MOST_STEPS = 0.3, 0.02, 30
 _NOTHING = 1e-4
 _OFFSET_WEAKEST_M, _SCALE_WEAKEST = 0.5, 1.0
 # Drives over one road leave no more together than each alone, but for so many times, and this share of the readings.
@@ -96,12 +96,11 @@ class RoadProblem:
         values, roads = np.array([one.start for one in self.free]), self.roads
         numbers = roads.first_guess(values)
         for index, (road, part) in enumerate(zip(roads.roads, roads.parts, strict=True)):
-            if self.options.place_off_m:
-                at, scaled = roads.state(index, values, numbers), part[roads.are(SCALE)[part]]
-                for number, place in enumerate(roads.places(index)):
-                    numbers[place], scale = road.place(at, number + 1)
-                    if self.options.scale_off:
-                        numbers[scaled[number]] = (scale - 1) / HUNDREDTH
+            at, scaled = roads.state(index, values, numbers), part[roads.are(SCALE)[part]]
+            for number, place in enumerate(roads.places(index)):
+                numbers[place], scale = road.place(at, number + 1)
+                if self.options.scale_off:
+                    numbers[scaled[number]] = (scale - 1) / HUNDREDTH
         return np.append(self.coordinates.of(values), numbers)
 
     def shifted(self, x: Array) -> Array:
@@ -119,7 +118,7 @@ class RoadProblem:
     def climb(self, x: Array) -> Maximum[RoadsScore]:
         """The largest likelihood uphill from a place."""
         return maximise(self.score, x, self.low, self.high, np.full(len(x), _LONGEST_STEP), close=_CLOSE,
-                        most_steps=self.options.most_steps)
+                        most_steps=_MOST_STEPS)
 
     def structural(self, information: Array) -> list[Finding]:
         """What no such drives could determine, of the car and of all else that is not known."""
