@@ -36,7 +36,6 @@ _KNOT_S, _MOST_KNOTS = 1 / 3, 360
 is wrong by 0.1 m/s now more and now less leaves a tenth more than the noise. The most, a run of two minutes: a fit's
 time grows with the square of their number."""
 
-_SMOOTH_S = 1.0  # a car's speed changes by no more than a cubic over it: half a period of its bounce
 _HELD = 1e-6  # of its deviation, within which a number is held
 
 
@@ -357,11 +356,11 @@ def _cubic_b_splines(pieces: int, count: int) -> csr_array:
 
 
 def _roughness(run: Run) -> Array:
-    """The part of a run's distance (n,) that is rougher than a car drives [m]: what a moving cubic fit over this time
+    """The part of a run's distance (n,) that is rougher than a car drives [m]: what a moving cubic fit over three knots
     leaves (A. Savitzky and M. Golay, Analytical Chemistry 36, 1964). The fit at an end serves up to there."""
     from scipy.signal import savgol_filter
 
-    half = min(round(_SMOOTH_S * run.rate_hz), run.count - 1) // 2
+    half = min(round(3 * _KNOT_S * run.rate_hz), run.count - 1) // 2
     if half < 2:
         return np.zeros(run.count)
     way = run.distance_m - run.distance_m[0]
