@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields
 from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -88,21 +88,29 @@ class OtherSettings:
     oftener: str = ""
 
 
+def setting(default: Any, kind: Kind) -> Any:
+    """A field of an accelerometer's settings: its default, and what may stand there in a settings file."""
+    return field(default=default, metadata={"kind": kind})
+
+
 class Accelerometer(ABC, Generic[Settings]):
     """One kind of accelerometer.
 
     name          in settings and recordings; the file is called so
     title         what people call it
-    settings      frozen dataclass of its settings, each with its default; SettingsError for values that cannot be
-    keys          what may stand at each of them in a settings file
+    settings      frozen dataclass of its settings (``setting``); SettingsError for values that cannot be
     event_bytes   size of one event; None: any
     """
 
     name: ClassVar[str]
     title: ClassVar[str]
     settings: type[Settings]
-    keys: ClassVar[Mapping[str, Kind]]
     event_bytes: int | None = None
+
+    @property
+    def keys(self) -> Mapping[str, Kind]:
+        """What may stand at each of its settings in a settings file."""
+        return {one.name: one.metadata["kind"] for one in fields(self.settings)}  # type: ignore[arg-type]
 
     def check_chosen(self, settings: Settings) -> None:
         """SettingsError where nothing can be made of these settings, once this is the chosen accelerometer."""

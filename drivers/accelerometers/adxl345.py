@@ -20,14 +20,14 @@ same numbers stand in the Linux kernel's driver [2].
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
-from drivers.accelerometers.accelerometer import Accelerometer, ReadingQuality
+from drivers.accelerometers.accelerometer import Accelerometer, ReadingQuality, setting
 from drivers.chip_bus import (
     BufferedChip,
     BufferedDecoder,
@@ -41,7 +41,7 @@ from drivers.chip_bus import (
 )
 from drivers.errors import BadReply, DeviceError, SettingsError
 from drivers.hardware import I2cBus, Machine
-from drivers.readings import STANDARD_GRAVITY_MPS2, Kind, OneOf, RecordedWords, Whole
+from drivers.readings import STANDARD_GRAVITY_MPS2, OneOf, RecordedWords, Whole
 from drivers.sources import Source
 
 ADDRESSES = (0x53, 0x1D)
@@ -87,8 +87,8 @@ log = logging.getLogger(__name__)
 class Adxl345Config:
     """``i2c_bus`` is the N of /dev/i2c-N; ``rate_hz`` samples a second, each with a bandwidth of half of that."""
 
-    i2c_bus: int = 1
-    rate_hz: int = 200
+    i2c_bus: int = setting(1, Whole(0, 255))
+    rate_hz: int = setting(200, OneOf(tuple(RATE_CODES)))
 
     def __post_init__(self) -> None:
         if self.rate_hz not in RATE_CODES:
@@ -166,7 +166,6 @@ class _Adxl345(Accelerometer[Adxl345Config]):
     name = "adxl345"
     title = "ADXL345"
     settings = Adxl345Config
-    keys: ClassVar[Mapping[str, Kind]] = {"i2c_bus": Whole(0, 255), "rate_hz": OneOf(tuple(RATE_CODES))}
 
     def place(self, settings: Adxl345Config) -> str:
         return f"/dev/i2c-{settings.i2c_bus}"

@@ -21,17 +21,17 @@ from __future__ import annotations
 
 import logging
 from array import array
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import sqrt
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import numpy.typing as npt
 
-from drivers.accelerometers.accelerometer import Accelerometer, OtherSettings, ReadingQuality
+from drivers.accelerometers.accelerometer import Accelerometer, OtherSettings, ReadingQuality, setting
 from drivers.chip_bus import ConfiguredChip, Register, RegisterField, ToggleRegister, bus_fault, find_chip
 from drivers.errors import BadReply, DeviceError, SettingsError
 from drivers.hardware import I2cBus, Machine
@@ -40,7 +40,6 @@ from drivers.readings import (
     UNREAD_CHIP,
     US_PER_S,
     AccelerationBlock,
-    Kind,
     OneOf,
     OrNone,
     RecordedWords,
@@ -374,10 +373,10 @@ def _bus(node: Node) -> int | Path:
 class Bma220Config:
     """``i2c_bus`` is the N of /dev/i2c-N, or the path of a recorded drive; None means automatic."""
 
-    i2c_bus: int | Path = 1
-    range_g: int = 2
-    bandwidth_hz: int | None = None
-    oversample: int | None = None
+    i2c_bus: int | Path = setting(1, Special(_bus, ("1", "0")))
+    range_g: int = setting(2, OneOf(tuple(RANGE_CODES)))
+    bandwidth_hz: int | None = setting(None, OrNone("auto", OneOf(BANDWIDTHS_HZ)))
+    oversample: int | None = setting(None, OrNone("auto", Whole(1, LARGEST_OVERSAMPLE)))
 
     def __post_init__(self) -> None:
         self.chip  # noqa: B018 - SettingsError for what the chip cannot have
@@ -400,12 +399,6 @@ class _Bma220(Accelerometer[Bma220Config]):
     name = "bma220"
     title = "BMA220"
     settings = Bma220Config
-    keys: ClassVar[Mapping[str, Kind]] = {
-        "i2c_bus": Special(_bus, ("1", "0")),
-        "range_g": OneOf(tuple(RANGE_CODES)),
-        "bandwidth_hz": OrNone("auto", OneOf(BANDWIDTHS_HZ)),
-        "oversample": OrNone("auto", Whole(1, LARGEST_OVERSAMPLE)),
-    }
     event_bytes = SAMPLE_BYTES
 
     def place(self, settings: Bma220Config) -> str:

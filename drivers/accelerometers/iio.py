@@ -16,11 +16,10 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from math import hypot, sqrt
-from typing import Any, ClassVar
+from typing import Any
 
 import numpy as np
 
@@ -34,7 +33,7 @@ from drivers.accelerometers._iio_device import (
     read_description,
     understood,
 )
-from drivers.accelerometers.accelerometer import SERIAL_WAIT_S, Accelerometer, ReadingQuality
+from drivers.accelerometers.accelerometer import SERIAL_WAIT_S, Accelerometer, ReadingQuality, setting
 from drivers.errors import BadReply, NotPresent, SettingsLost
 from drivers.hardware import Machine
 from drivers.readings import (
@@ -43,7 +42,6 @@ from drivers.readings import (
     AccelerationBlock,
     Decimal,
     Event,
-    Kind,
     OrNone,
     RecordedWords,
     Text,
@@ -68,10 +66,10 @@ class IioConfig:
     """``device``: name of the chip or of its folder, or ``auto``; ``rate_hz``: asked of it; ``scale_mps2``: the step
     that it is set to, None leaves it; ``noise_mps2``: of the chip on the 100 Hz grid, r.m.s."""
 
-    device: str = AUTO
-    rate_hz: int = 200
-    scale_mps2: float | None = None
-    noise_mps2: float = NOISE_MPS2
+    device: str = setting(AUTO, Text())
+    rate_hz: int = setting(200, Whole(100, 1000))
+    scale_mps2: float | None = setting(None, OrNone("auto", Decimal(*_STEP_MPS2)))
+    noise_mps2: float = setting(NOISE_MPS2, Decimal(*_NOISE_MPS2))
 
 
 class IioSource:
@@ -314,12 +312,6 @@ class _Iio(Accelerometer[IioConfig]):
     name = "iio"
     title = "IIO accelerometer"
     settings = IioConfig
-    keys: ClassVar[Mapping[str, Kind]] = {
-        "device": Text(),
-        "rate_hz": Whole(100, 1000),
-        "scale_mps2": OrNone("auto", Decimal(*_STEP_MPS2)),
-        "noise_mps2": Decimal(*_NOISE_MPS2),
-    }
 
     def place(self, settings: IioConfig) -> str:
         return f"/sys/bus/iio/devices ({settings.device})"

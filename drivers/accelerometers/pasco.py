@@ -20,7 +20,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from drivers.accelerometers.accelerometer import ReadingQuality, SerialAccelerometer
+from drivers.accelerometers.accelerometer import ReadingQuality, SerialAccelerometer, setting
 from drivers.errors import SettingsError
 from drivers.framing import Arrivals, FixedFramer, Frame, LineFramer, exclusive_or, numbers_in
 from drivers.plain_yaml import Node
@@ -29,7 +29,6 @@ from drivers.readings import (
     STANDARD_GRAVITY_MPS2,
     AccelerationBlock,
     Flag,
-    Kind,
     OrNone,
     RecordedWords,
     Special,
@@ -258,11 +257,12 @@ def _counts_at_0_and_1_g(node: Node) -> tuple[float, float]:
 class PascoConfig:
     """``profile`` is a shipped name or a path; ``calibration`` None takes the profile's own."""
 
-    port: str = "/dev/ttyUSB0"
-    baud: int = 115200
-    profile: str = "lines"
-    accept_unverified: bool = False
-    calibration: ScaleCalibration | None = None
+    port: str = setting("/dev/ttyUSB0", Text())
+    baud: int = setting(115200, BAUDS)
+    profile: str = setting("lines", Special(_profile_name, ("lines", "lines_mps2")))
+    accept_unverified: bool = setting(False, Flag())
+    calibration: ScaleCalibration | None = setting(None, OrNone("null", Special(_calibration, (
+        "{x: [4096, 0, 4424, 1], y: [4096, 0, 4424, 1], z: [4096, 0, 4424, 1]}",))))
 
 
 class _Pasco(SerialAccelerometer[PascoConfig]):
@@ -271,14 +271,6 @@ class _Pasco(SerialAccelerometer[PascoConfig]):
     name = "pasco"
     title = "serial sensor"
     settings = PascoConfig
-    keys: ClassVar[Mapping[str, Kind]] = {
-        "port": Text(),
-        "baud": BAUDS,
-        "profile": Special(_profile_name, ("lines", "lines_mps2")),
-        "accept_unverified": Flag(),
-        "calibration": OrNone("null", Special(_calibration, (
-            "{x: [4096, 0, 4424, 1], y: [4096, 0, 4424, 1], z: [4096, 0, 4424, 1]}",))),
-    }
     lines: ClassVar[Mapping[str, Any]] = {"profile": "lines"}
 
     def check_chosen(self, settings: PascoConfig) -> None:
