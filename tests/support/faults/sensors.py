@@ -578,10 +578,10 @@ WEEK = timedelta(days=7)
 HAZARDS = (
     Hazard("accelerometer unplugged for 0.3 to 40 s", "no chip answers on the bus, from a random time on",
            "GPS goes on; back within 30 s after the cable is, with the hole marked `gap`; `status` names the wires",
-           "back after {waited_s.least:.1f} to {waited_s.most:.1f} s", accelerometer_unplugged, range(60), 6),
+           "back after {waited_s.least:.1f} to {waited_s.most:.1f} s", accelerometer_unplugged, range(60), 3),
     Hazard("GPS unplugged for 2 to 30 s", "the port fails, then cannot be opened",
            "no sample of the accelerometer is lost; rows are marked `gps_lost`; the fix is taken up again",
-           "{heard_percent.least:.1f} % of samples heard, or more", receiver_unplugged, range(40), 4),
+           "{heard_percent.least:.1f} % of samples heard, or more", receiver_unplugged, range(40), 2),
     Hazard("another chip at the address", "its identity register holds something else",
            "no sample is taken; both identities are named; the right chip is found within 31 s", "as promised",
            another_chip, (0xE5, 0x00, 0xFF, 0x33)),
@@ -623,7 +623,8 @@ HAZARDS = (
            "{rows.total:.0f} rows in that hour", hour_without_fix),
     Hazard("GPS date jumps for seconds", "a week on or back, 1024 weeks, a day, for 1, 3 and 20 s",
            "no row changes", "{rows.total:.0f} rows, all the same", date_jumps_for_seconds,
-           tuple(product((WEEK, -WEEK, 1024 * WEEK, timedelta(days=-1)), (1, 3, 20)))),
+           tuple((jump, lasts_s) for lasts_s, jump in product(
+               (1, 3, 20), (WEEK, -WEEK, 1024 * WEEK, timedelta(days=-1)))), 4),
     Hazard("GPS date jumps for good", "a week on or back, and it stays",
            "UTC follows after half a minute; nothing else in any row changes",
            "rows from {after_s.least:.0f} s after the jump on have the new UTC", date_jumps_for_good, (WEEK, -WEEK)),
