@@ -359,22 +359,20 @@ class Search(Generic[M, P, F]):
         lost = base.score - now.score
         with ThreadPoolExecutor(self.workers) as pool:
             unfitted = self._screen_all(pool, base, effects, instead_of)
-            worth = [(base, one) for one in unfitted[: effort.fitted] if one.gain > effort.fit_share * (lost + to_gain)]
+            worth = self._may_win(base, unfitted, effort.fit_share * (lost + to_gain))
             self._promising |= {one.effect.name for _, one in worth}
             aligning = [one for one in effects if one.realigns]
             if aligning and (there := self.likelihood.laid_anew(now)) is not None:
-                worth += [(there, one) for one in self._screen_all(pool, there, aligning)[: effort.fitted]
-                          if one.gain > effort.fit_share * to_gain]
+                worth += self._may_win(there, self._screen_all(pool, there, aligning), effort.fit_share * to_gain)
             self.progress(f"fitting {len(worth)} of them")
             tries = self._fit_all_roughly(pool, now.score, worth[:1], 0.0)
             to_gain = max(to_gain, self._reached(now, tries))
             enough = effort.fit_share * to_gain
-            # What only shifts a run gains nothing to first order where the distance errors have taken it.
             tries += self._fit_all_roughly(pool, now.score, [
                 pair for pair in worth[1:] if pair[1].gain > enough or not pair[1].effect.reshapes], enough)
             rough = _best_of_each(tries)
             enough = effort.refine_share * max([to_gain, *(one.gain for one in rough)])
-            best = {one.effect.name: one.gain for one in rough if one.gain > enough}
+            best = {one.effect.name: one.gain for one in rough if one.gain > (enough if one.effect.reshapes else 0.0)}
             good = [one for one in sorted(tries, key=lambda one: -one.gain)
                     if one.gain > effort.tie_share * best.get(one.effect.name, np.inf)]
             if len(good) == 1 and instead_of is None and self.is_accepted(now, good[0]):
@@ -391,6 +389,12 @@ class Search(Generic[M, P, F]):
         fitted = {one.effect.name for one in fits}
         return SearchRound(tuple(fits), tuple(one for one in unfitted if one.effect.name not in fitted))
 
+    def _may_win(self, base: M, screened: Sequence[P], enough: float) -> list[tuple[M, P]]:
+        """The first of some screenings on a model that gain enough. What only shifts a run gains next to nothing to
+        first order where the distance errors have taken it."""
+        return [(base, one) for one in screened[: self.effort.fitted]
+                if one.gain > (enough if one.effect.reshapes else 0.0)]
+
     def _screen_all(self, pool: ThreadPoolExecutor, base: M, effects: Sequence[Effect],
                     near: Chosen | None = None) -> list[P]:
         """Screenings of effects on a model, the largest gain first."""
@@ -399,7 +403,8 @@ class Search(Generic[M, P, F]):
     def _fit_all_roughly(self, pool: ThreadPoolExecutor, score: float, worth: Sequence[tuple[M, P]],
                          least: float) -> list[F]:
         """Rough fits of screened effects, each on its model, from all their trials that gain more than this."""
-        fits = pool.map(lambda pair: self.likelihood.fitted_roughly(score, pair[0], pair[1], least), worth)
+        fits = pool.map(lambda pair: self.likelihood.fitted_roughly(
+            score, *pair, least if pair[1].effect.reshapes else 0.0), worth)
         return [one for some in fits for one in some]
 
     def _reached(self, now: M, fits: Sequence[F]) -> float:
