@@ -556,6 +556,9 @@ Tolerance = Annotated[float | str | None, Option(
     metavar=f"SHARE|{UNKNOWN}", read=word_or_number(UNKNOWN, TOLERANCE),
     check=check_word_or_number(UNKNOWN, TOLERANCE))]
 Candidates = Annotated[Collection[str] | None, "names of the effects to be tried; None: all"]
+LowPass = Annotated[float | None, Option(
+    "leave out frequencies above it, for example 20, in the record and in the model; errors are of the rest (default: "
+    "all that the record holds; a record that somebody has low-passed is recognised, and said)", metavar="HZ")]
 EffectFiles = Annotated[Sequence[Path | str], Option(
     "a Python file with an effect of your own, to be tried as well; may repeat. The names hysteresis and "
     "frame_friction are taken too: ridelog has these effects, and tries them only where they are asked for",

@@ -11,6 +11,7 @@ import pytest
 from scipy.signal import butter, sosfiltfilt
 
 from logger.commands.main import main
+from logger.errors import BadInput
 
 
 @pytest.fixture(scope="module")
@@ -76,18 +77,20 @@ def test_a_record_as_it_was_recorded_is_compared_whole(
 
 
 @pytest.mark.slow
-def test_what_the_runs_file_says_is_left_out_of_the_record_and_of_the_model(
+def test_what_is_asked_is_left_out_of_the_record_and_of_the_model(
         drives: dict[str, list[str]], capsys: pytest.CaptureFixture[str]) -> None:
     """Of white noise of 0.05 m/s2 two fifths lie below 20 Hz of 50."""
     run = drives["plain"][0]
-    whole = answer(capsys, "compare", run)
-    (Path(run) / "run.yaml").write_text("pass_band_hz: [0, 20]\n", "utf-8")
-    try:
-        found = answer(capsys, "compare", run)
-    finally:
-        (Path(run) / "run.yaml").unlink()
+    whole, found = answer(capsys, "compare", run), answer(capsys, "compare", run, "--low-pass", "20")
     assert found["pass_band_hz"] == [0, 20] and found["low_passed_at_hz"] is None
     assert found["error"] == pytest.approx(float(str(whole["error"])) * np.sqrt(0.4), rel=0.05)
+    (Path(run) / "run.yaml").write_text("pass_band_hz: [0, 20]\n", "utf-8")
+    try:
+        assert answer(capsys, "compare", run)["error"] == pytest.approx(found["error"])
+    finally:
+        (Path(run) / "run.yaml").unlink()
+    with pytest.raises(BadInput, match="low-pass 70: expected above 0 and below 50 Hz"):
+        main(["compare", "--vehicle", "rav4-2009", run, "--low-pass", "70"])
 
 
 @pytest.mark.release

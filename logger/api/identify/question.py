@@ -14,6 +14,7 @@ from logger.api.question import (
     Argument,
     InPython,
     LongQuestion,
+    LowPass,
     Option,
     Out,
     Runs,
@@ -123,8 +124,7 @@ class IdentifyQuestion(LongQuestion):
     noise: Annotated[str, Option(
         "model of the residual: white (output error), ar (innovations form), road (roughness that the profile does "
         "not contain, through the car); auto: the likeliest", choices=NOISE_MODELS)] = "auto"
-    low_pass_hz: Annotated[float | None, InPython(
-        "frequencies above it are left out (default: as the pass_band_hz of each run's run.yaml says)")] = None
+    low_pass_hz: LowPass = None
     tries: Annotated[int, InPython("so many further starts, spread around", TRIES)] = 0
     road: Annotated[str, Switches(
         "measured: with its profile; unmeasured: each run has a road of its own, of the waviness; same: all are over "

@@ -21,7 +21,7 @@ from logger.api.drives import Run as DrivenRun
 from logger.api.drives import run_on_road
 from logger.api.lab.checks import check_model, check_moves, checked_runs, predicted
 from logger.api.lab.question import LabQuestion
-from logger.api.question import TOLERANCE, UNKNOWN, Notify, Runs, each, silent
+from logger.api.question import TOLERANCE, UNKNOWN, Notify, Runs, WrongOption, each, silent
 from logger.api.vehicles import model_of
 from logger.errors import BadInput
 from logger.lab.compare import LabComparison, compare
@@ -193,7 +193,7 @@ class Bench:
 
 
 def bench_of(word: str, model: CarModel, runs: SimulatedRuns, effect_files: Sequence[str],
-             tolerance: Tolerance, searches: str | None = None, warn: Notify = silent,
+             tolerance: Tolerance, searches: str | None = None, warn: Notify = silent, low_pass_hz: float | None = None,
              anyway: bool = False) -> Bench:
     """The model, runs and effects together. Raises BadInput for whatever is wrong with them. Of runs that somebody has
     low-passed, or that say so, only the band that remains is compared.
@@ -202,6 +202,7 @@ def bench_of(word: str, model: CarModel, runs: SimulatedRuns, effect_files: Sequ
     tolerance   as ``tolerance_of``
     searches    the command that will search through all effects, and so needs the compiler; None: it will not
     warn        called where it will take long, and with what was wrong where the user goes on ``anyway``
+    low_pass_hz what lies above is not compared; None: all is that the records hold
     """
     effects, files = known_effects(model, effect_files, are_on_rig(runs.runs), _scales(word, model, runs))
     if searches is not None:
@@ -212,7 +213,7 @@ def bench_of(word: str, model: CarModel, runs: SimulatedRuns, effect_files: Sequ
     shipped = {name: one for name, one in effects.items() if name not in files}  # the user's own are not tried yet
     predictions = check_model(word, model, runs, warn, shipped, tolerance, anyway)
     _try_own(found, effect_files)
-    return replace(found, runs=_in_their_bands(runs, predictions))
+    return replace(found, runs=_in_their_bands(runs, predictions, low_pass_hz))
 
 
 def planned_bench(word: str, model: CarModel, drives: Sequence[Run], effect_files: Sequence[str],
@@ -315,10 +316,15 @@ def among(effects: Mapping[str, Effect], names: Collection[str] | None) -> dict[
     return {name: effects[name] for name in sorted(names)}
 
 
-def _in_their_bands(runs: SimulatedRuns, predictions: Sequence[Array]) -> SimulatedRuns:
+def _in_their_bands(runs: SimulatedRuns, predictions: Sequence[Array], low_pass_hz: float | None) -> SimulatedRuns:
     """The runs as they are compared. BadInput where next to nothing would be."""
+    half_hz = runs.runs[0].rate_hz / 2
+    if low_pass_hz is not None and not 0 < low_pass_hz < half_hz:
+        raise WrongOption(f"`low_pass_hz` {low_pass_hz:g}: expected above 0 and below {half_hz:g} Hz, half the "
+                          "sample rate")
     try:
-        found = with_pass_bands(runs.runs, [run.main(one) for run, one in zip(runs.runs, predictions, strict=True)])
+        found = with_pass_bands(runs.runs, [run.main(one) for run, one in zip(runs.runs, predictions, strict=True)],
+                                low_pass_hz)
     except ValueError as error:
         raise BadInput(str(error)) from None
     same = all(one.low_pass is None and one.facts.pass_band_hz is None for one in found)
@@ -369,7 +375,7 @@ def bench_with(question: LabQuestion, searches: str | None = None, thin: bool = 
     off = tolerance_of(question.tolerance, model.known)
     return bench_of(word_of(given.vehicle, model), model, checked_runs(lab_drives(given.runs), thin, model.vehicle),
                     list(map(str, getattr(question, "effect_files", ()))), off, searches, question.warn,
-                    question.anyway)
+                    question.low_pass_hz, question.anyway)
 
 
 def lab_drives(runs: Runs) -> list[drive_file.DriveOnRoad]:

@@ -14,6 +14,7 @@ from logger.api.question import (
     Candidates,
     EffectFiles,
     LongQuestion,
+    LowPass,
     Option,
     Out,
     Runs,
@@ -37,6 +38,7 @@ class LabQuestion(LongQuestion):
     """What the lab's verbs have in common; each has a ``vehicle``, ``runs`` and maybe ``effect_files`` as well."""
 
     tolerance: Tolerance = None
+    low_pass_hz: LowPass = None
     anyway: Anyway = False
 
     def files_read(self) -> Sequence[Path]:

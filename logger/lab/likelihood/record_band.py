@@ -119,16 +119,17 @@ def detect_low_passes(runs: Sequence[Run], predictions: Sequence[Array]) -> list
             for one, fit in zip(found, fits, strict=True)]
 
 
-def with_pass_bands(runs: Sequence[Run], predictions: Sequence[Array]) -> list[Run]:
-    """The runs filtered to their pass bands, which end where their facts say and where a low-pass was detected.
+def with_pass_bands(runs: Sequence[Run], predictions: Sequence[Array], low_pass_hz: float | None = None) -> list[Run]:
+    """The runs filtered to their pass bands, which end where their facts say, where a low-pass was detected, and at
+    ``low_pass_hz``.
 
     ValueError where nothing is left.
     """
-    return [cut_to_pass_band(run, prediction, seen) for run, seen, prediction in
+    return [cut_to_pass_band(run, prediction, seen, low_pass_hz) for run, seen, prediction in
             zip(runs, detect_low_passes(runs, predictions), predictions, strict=True)]
 
 
-def cut_to_pass_band(run: Run, prediction: Array, seen: LowPass | None) -> Run:
+def cut_to_pass_band(run: Run, prediction: Array, seen: LowPass | None, low_pass_hz: float | None = None) -> Run:
     """The run filtered to its pass band, given the low-pass that it went through, and a model's prediction (n,). What a
     rig does may all be slow, without any filter: a band that is asked for is taken there, however narrow, and what
     seems to be a filter below is none.
@@ -136,6 +137,8 @@ def cut_to_pass_band(run: Run, prediction: Array, seen: LowPass | None) -> Run:
     ValueError where nothing is left.
     """
     low_hz, high_hz = run.pass_band_hz
+    if low_pass_hz is not None:
+        high_hz = min(high_hz, low_pass_hz)
     if run.timed and seen is not None and not is_wide_enough(run, seen):
         seen = None
     if seen is not None and is_steep(seen) and (ends_hz := pass_band_end_hz(seen, run.rate_hz)) < high_hz:

@@ -72,8 +72,7 @@ def test_a_wrong_place_is_named_with_its_share() -> None:
 @pytest.mark.slow
 def test_what_lies_outside_of_the_pass_band_has_its_share() -> None:
     made = beside_with(lambda run, _, rng: rng.normal(0, NOISE_MPS2, run.count), 2003, 30.0)
-    said = [replace(run, facts=replace(run.facts, pass_band_hz=(0.0, 25.0))) for run in made.runs]
-    runs = with_pass_bands(said, made.predictions)
+    runs = with_pass_bands(made.runs, made.predictions, low_pass_hz=25.0)
     found = compare(SimulatedRuns(runs), CAR)
     # The model is right: noise alone differs, white up to half the sample rate, half of it above 25 Hz.
     assert found.removed.filter_share == pytest.approx(0.5, abs=0.03)
