@@ -1,14 +1,14 @@
 """Run a recorded drive through the service and show the result; needs no hardware.
 
 The drive is simulated: a half car over generated roads, recorded as the bytes that a BMA220 and a GPS would have
-sent. It goes through recorded buses into the real drivers and the real service. 'demo lab' finds what a car has that
-its model lacks; 'demo field' does so from recorded bytes, and shows what it does to the IRI. 'demo car' learns a car
-that nobody measured from four drives.
+sent. It goes through recorded buses into the real drivers and the real service. --lab finds what a car has that its
+model lacks; --field does so from recorded bytes, and shows what it does to the IRI. --car learns a car that nobody
+measured from four drives.
 
   ridelog demo
-  ridelog demo lab
-  ridelog demo field
-  ridelog demo car
+  ridelog demo --lab
+  ridelog demo --field
+  ridelog demo --car
 """
 
 from __future__ import annotations
@@ -45,26 +45,24 @@ DRIVE_DIR, LAB_DIR, FIELD_DIR, CAR_DIR = "ridelog-demo", "ridelog-lab", "ridelog
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Arguments of ``ridelog demo``."""
-    parser.add_argument("what", nargs="?", choices=sorted(_SHOWN), metavar="lab|field|car",
-                        help="show this instead. lab: two drives of a car that has something its model lacks, found; "
-                             "field: from a car's recordings to a better IRI, four drives over two measured lines; "
-                             "car: springs and dampers of a car that nobody measured, from four ordinary drives")
-    parser.add_argument("--out", metavar="DIR", type=Path,
-                        help=f"folder for what is written (default: {DRIVE_DIR}, of the others {LAB_DIR}, {FIELD_DIR}, "
-                             f"{CAR_DIR})")
+    shown = parser.add_mutually_exclusive_group()
+    for name, (_, folder, words) in _SHOWN.items():
+        shown.add_argument(f"--{name}", dest="what", action="store_const", const=name,
+                           help=f"{words} (folder: {folder})")
+    parser.add_argument("--out", metavar="DIR", type=Path, help=f"folder for what is written (default: {DRIVE_DIR})")
     parser.add_argument("--unpack", action="store_true",
-                        help="with lab, field or car: only write the drives, to find it yourself")
+                        help="with --lab, --field or --car: only write the drives, to find it yourself")
     parser.add_argument("--json", action="store_true", help="one JSON object instead of text")
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog demo``."""
     if args.unpack and args.what is None:
-        raise BadInput("demo: expected lab, field or car with --unpack")
+        raise BadInput("demo: expected --lab, --field or --car with --unpack")
     if args.what is None:
         _drive(args.out or Path(DRIVE_DIR), args.json)
     else:
-        show, folder = _SHOWN[args.what]
+        show, folder, _ = _SHOWN[args.what]
         show(args.out or Path(folder), args.unpack, args.json)
     return EXIT_DONE
 
@@ -159,7 +157,7 @@ def lab(out: Path, unpack_only: bool, as_json: bool) -> None:
     from logger.api.lab.loop import unsaid_lines
 
     if not unpack_only:
-        require_compiler("ridelog demo lab", sought_effects().values())
+        require_compiler("ridelog demo --lab", sought_effects().values())
     folders = unpack(out)
     drives = " ".join(map(str, folders))
     if unpack_only:
@@ -237,7 +235,7 @@ def field(out: Path, unpack_only: bool, as_json: bool) -> None:
     from logger.store.formats.effect_file import shipped_effects
 
     if not unpack_only:
-        require_compiler("ridelog demo field", shipped_effects().values())
+        require_compiler("ridelog demo --field", shipped_effects().values())
     unpacked("field.zip", out)
     first, fourth = [_dump(out, name) for name in DRIVES], _dump(out, FOURTH)
     commands = _Commands(out, first, fourth, FIELD.vehicle)
@@ -432,5 +430,9 @@ def _name(dump: Path) -> str:
     return name_of(dump)
 
 
-_SHOWN = {"lab": (lab, LAB_DIR), "field": (field, FIELD_DIR), "car": (car, CAR_DIR)}
-"""What can be shown instead of a drive through the service, and the folder for it."""
+_SHOWN = {
+    "lab": (lab, LAB_DIR, "show the lab instead: two drives of a car that has something its model lacks, found"),
+    "field": (field, FIELD_DIR, "show the loop from a car's recordings to a better IRI: four drives, two roads"),
+    "car": (car, CAR_DIR, "learn a car that nobody measured: four ordinary drives, its springs and dampers"),
+}
+"""What can be shown instead of a drive through the service, the folder for it, and its help."""

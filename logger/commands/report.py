@@ -33,23 +33,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("logs", metavar="LOGS", type=Path, nargs="+",
                         help="log files, folders of them, exported sticks; a log that is there twice counts once")
     parser.add_argument("--out", metavar="FILE.html", type=Path, required=True, help="page to write")
-    parser.add_argument("--base", metavar="ROADS.geojson|ADDRESS", nargs="?", const=STREETS, default="",
-                        help="draw roads beneath the drives: those of a file, such as an extract of OpenStreetMap, "
-                             "which the page then holds; or pictures of streets, for which the page asks a server, "
-                             "with {z}, {x} and {y} in its address (without one: OpenStreetMap's)")
+    parser.add_argument("--base", metavar="ROADS.geojson", type=Path,
+                        help="roads to draw beneath the drives, such as an extract of OpenStreetMap, kept in the page")
+    parser.add_argument("--tiles", metavar="ADDRESS", nargs="?", const=STREETS, default="",
+                        help="draw pictures of streets beneath the drives: the page then asks a server for them "
+                             "(with {z}, {x} and {y} in the address; by default OpenStreetMap's)")
     parser.add_argument("--json", action="store_true", help="also print the summary, as one JSON object")
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog report``."""
-    tiles_from = args.base if "://" in args.base else ""
-    _check_tiles(tiles_from)
-    roads = Path(args.base) if args.base and not tiles_from else None
+    _check_tiles(args.tiles)
     if args.out.suffix.lower() in ENDINGS:
         raise BadInput(f"--out {args.out}: expected the name of a web page, such as {args.out.stem}.html")
-    base = [] if roads is None else [MapLine("", *line) for line in read_road_lines(roads)]
-    files = write_report(find_logs_in(args.logs), args.out, base=base, base_name="" if roads is None else roads.name,
-                         tiles_from=tiles_from)
+    base = [] if args.base is None else [MapLine("", *line) for line in read_road_lines(args.base)]
+    files = write_report(find_logs_in(args.logs), args.out, base=base,
+                         base_name="" if args.base is None else args.base.name, tiles_from=args.tiles)
     records = [record for file in files for record in file.records]
     if args.json:
         print(json.dumps({"report": str(args.out), "files": [file.name for file in files],
@@ -64,7 +63,7 @@ def run(args: argparse.Namespace) -> int:
 def _check_tiles(address: str) -> None:
     whole = re.fullmatch(r"https?://[\w.-]+(:\d+)?/\S*", address, re.ASCII)
     if address and not (whole and all(key in address for key in ("{z}", "{x}", "{y}"))):
-        raise BadInput(f"--base: expected an address such as {STREETS}, found {address!r}")
+        raise BadInput(f"--tiles: expected an address such as {STREETS}, found {address!r}")
 
 
 def write_report(logs: Sequence[tuple[Path, Path | None]], out: Path, *, base: Sequence[MapLine] = (),

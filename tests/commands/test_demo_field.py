@@ -1,4 +1,4 @@
-"""``ridelog demo field``: from recorded bytes to a better IRI, and the document that leads through it."""
+"""``ridelog demo --field``: from recorded bytes to a better IRI, and the document that leads through it."""
 
 from __future__ import annotations
 
@@ -20,20 +20,20 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 
 def test_the_drives_are_unpacked(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["demo", "field", "--unpack", "--out", str(tmp_path), "--json"]) == 0
+    assert main(["demo", "--field", "--unpack", "--out", str(tmp_path), "--json"]) == 0
     reported = json.loads(capsys.readouterr().out)
     assert reported["vehicle"] == "rav4-2009"
     assert [Path(one).name for one in reported["dumps"]] == ["first.dump.gz", "second.dump.gz", "third.dump.gz",
                                                          "fourth.dump.gz"]
     assert all(Path(one).is_file() for one in [*reported["dumps"], *reported["lines"]])
-    assert main(["demo", "field", "--unpack", "--out", str(tmp_path)]) == 0
+    assert main(["demo", "--field", "--unpack", "--out", str(tmp_path)]) == 0
     assert f"Next: ridelog extract {tmp_path / 'first.dump.gz'}" in capsys.readouterr().out
 
 
 def test_a_file_of_the_users_own_stays(tmp_path: Path) -> None:
     (tmp_path / "line.csv").write_text("mine\n", "utf-8")
     with pytest.raises(BadInput, match=r"line\.csv: expected nothing there"):
-        main(["demo", "field", "--out", str(tmp_path)])
+        main(["demo", "--field", "--out", str(tmp_path)])
     assert [path.name for path in tmp_path.iterdir()] == ["line.csv"]
 
 
@@ -41,7 +41,7 @@ def test_a_file_of_the_users_own_stays(tmp_path: Path) -> None:
 def test_a_run_of_either_sensor_can_be_read_and_says_what_its_steps_are(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert main(["demo", "field", "--unpack", "--out", str(tmp_path)]) == 0
+    assert main(["demo", "--field", "--unpack", "--out", str(tmp_path)]) == 0
     dumps = [str(tmp_path / f"{name}.dump.gz") for name in ("second", "third")]
     assert main(["extract", *dumps, "--out", str(tmp_path / "runs"), "--profile", str(tmp_path / "line.csv")]) == 0
     assert capsys.readouterr().out.count("matched to the road") == 2
@@ -51,7 +51,7 @@ def test_a_run_of_either_sensor_can_be_read_and_says_what_its_steps_are(
 
 
 def test_one_demo_at_a_time() -> None:
-    done = called("demo", "field", "--lab")
+    done = called("demo", "--field", "--lab")
     assert (done.returncode, done.stdout) == (2, "")
 
 
@@ -62,7 +62,7 @@ def test_the_effect_is_found_and_the_fourth_drive_is_judged_rightly(
     """Among a few effects; that it is found among all of them is what the document shows."""
     few = {name: one for name, one in shipped_effects().items() if name in FEW}
     monkeypatch.setattr("logger.store.formats.effect_file.shipped_effects", lambda: few)
-    done = called("demo", "field", "--json", "--out", tmp_path)
+    done = called("demo", "--field", "--json", "--out", tmp_path)
     assert done.returncode == 0 and all(line.startswith("Wrote ") for line in done.stderr.splitlines()), done.stderr
     reported = json.loads(done.stdout)
     assert [Path(one["run"]).name for one in reported["runs"]] == ["first", "second", "third", "fourth"]

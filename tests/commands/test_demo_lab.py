@@ -1,4 +1,4 @@
-"""``ridelog demo lab --unpack``: what is said of the drives is true, and nobody's files are written over."""
+"""``ridelog demo --lab --unpack``: what is said of the drives is true, and nobody's files are written over."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ DOC = Path(__file__).parents[2] / "docs" / "lab.md"
 
 
 def unpack(folder: Path) -> CompletedProcess[str]:
-    return called("demo", "lab", "--unpack", "--out", folder / "lab")
+    return called("demo", "--lab", "--unpack", "--out", folder / "lab")
 
 
 def files_in(folder: Path) -> dict[str, bytes]:

@@ -89,7 +89,7 @@ WRITERS = {
     "fleet report --out": Writer(dataset, "fleet report town --out page"),
     "fixed-point --out": Writer(road, "fixed-point --out firmware"),
     "study --out": Writer(road, "study table-4-3 --quick --out a.html"),
-    "extract --out": Writer(lambda folder: called("demo", "field", "--unpack", "--out", folder / "field"),
+    "extract --out": Writer(lambda folder: called("demo", "--field", "--unpack", "--out", folder / "field"),
                             "extract field/first.dump.gz --profile field/line.csv --out runs"),
     "plan --out": Writer(run, f"plan {LAB} --out a.html"),
     "diagnose --out": Writer(run, f"diagnose {LAB} --out a.html"),

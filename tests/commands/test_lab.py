@@ -1,4 +1,4 @@
-"""``ridelog lab`` and ``ridelog demo lab``: the loop with and without somebody to ask, its files and its page."""
+"""``ridelog lab`` and ``ridelog demo --lab``: the loop with and without somebody to ask, its files and its page."""
 
 from __future__ import annotations
 
@@ -195,7 +195,7 @@ def test_no_more_files_are_written_than_were_looked_at(
 
 
 def test_the_demos_drives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["demo", "lab", "--unpack", "--out", str(tmp_path), "--json"]) == 0
+    assert main(["demo", "--lab", "--unpack", "--out", str(tmp_path), "--json"]) == 0
     reported = json.loads(capsys.readouterr().out)
     assert reported["runs"] == [str(tmp_path / "slow"), str(tmp_path / "brisk")]
     with pytest.raises(BadInput, match="expected lab, field or car"):

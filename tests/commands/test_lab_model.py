@@ -140,7 +140,7 @@ def test_a_search_that_could_not_try_every_effect_is_refused(
     """Without a compiler some effects cannot be tried: "nothing is missing" would be no answer."""
     monkeypatch.setattr("logger.vehicle.stepping_loop.COMPILED", False)
     out = tmp_path / "out"
-    given = ["demo", "lab", "--out", str(out)] if command == "demo" else [
+    given = ["demo", "--lab", "--out", str(out)] if command == "demo" else [
         *COMMANDS[command](tmp_path), "--vehicle", "rav4-2009", *runs]
     words = rf"the lab extra \(pip install '\.\[lab\]'\).* [1-9]\d* of {len(sought_effects())} effects"
     with pytest.raises(BadInput, match=words) as refused:

@@ -161,7 +161,7 @@ def test_a_limp_damper_and_a_trailer_are_named(tmp_path: Path) -> None:
 
 
 def test_the_demo_writes_drives_and_says_what_to_type(tmp_path: Path) -> None:
-    found = called("demo", "car", "--unpack", "--out", tmp_path / "car")
+    found = called("demo", "--car", "--unpack", "--out", tmp_path / "car")
     assert found.returncode == 0
     assert re.search(r"Next: ridelog learn-car \S+30kmh .* --wheelbase 2.39 --out \S+mycar.yaml", found.stdout)
     assert sorted(one.name for one in (tmp_path / "car").rglob("*.csv")) == 4 * ["drive.csv"]
@@ -169,7 +169,7 @@ def test_the_demo_writes_drives_and_says_what_to_type(tmp_path: Path) -> None:
 
 @pytest.mark.slow
 def test_the_demo_learns_its_car(tmp_path: Path) -> None:
-    found = called("demo", "car", "--out", tmp_path)
+    found = called("demo", "--car", "--out", tmp_path)
     assert found.returncode == 0, found.stderr
     rows = re.findall(r"^(?:front|rear)\.\w+ +([\d.]+) +([\d.]+)$", found.stdout, re.MULTILINE)
     assert len(rows) == 6 and all(abs(float(mine) / float(true) - 1) < 0.1 for true, mine in rows)

@@ -1,4 +1,4 @@
-"""The drives of ``demo field``: what ships against its plan; what a car with effects feels, by another model."""
+"""The drives of ``demo --field``: what ships against its plan; what a car with effects feels, by another model."""
 
 from __future__ import annotations
 

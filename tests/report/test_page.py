@@ -273,12 +273,12 @@ def test_roads_of_every_kind_are_read(tmp_path: Path) -> None:
         ([46.5, 46.5], [6.5, 6.6]), ([2, 4], [1, 3]), ([6, 8], [5, 7])]
 
 
-@pytest.mark.parametrize("address", [
-    "ftp://host/{z}/{x}/{y}", "https://host/{z}/{x}.png", "https://h/{z}/{x}/{y}';script-src *", "http://["])
+@pytest.mark.parametrize("address", ["logs", "https://host/{z}/{x}.png", "https://h/{z}/{x}/{y}';script-src *",
+                                     "http://["])
 def test_an_address_of_no_street_pictures_is_refused(drive, tmp_path: Path, address: str) -> None:
     write_log(tmp_path / "00001-001.csv", drive(2))
-    with pytest.raises(BadInput, match="--base: expected an address such as https"):
-        main.main(["report", str(tmp_path), "--out", str(tmp_path / "p.html"), "--base", address])
+    with pytest.raises(BadInput, match="--tiles: expected an address such as https"):
+        main.main(["report", str(tmp_path), "--out", str(tmp_path / "p.html"), "--tiles", address])
 
 
 def test_a_part_that_is_finished_before_it_is_read_is_read_as_what_it_has_become(

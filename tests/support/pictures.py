@@ -54,7 +54,7 @@ def main() -> None:
         called("demo", "--out", str(box))
         the_map(box / "report.html", DOCS / "map.png")
         called("passes", str(box), "--out", str(DOCS / "roughness.png"))
-        called("demo", "lab", "--out", str(lab))
+        called("demo", "--lab", "--out", str(lab))
         runs = [lab / "slow", lab / "brisk"]
         found = [compare(vehicle, runs) for vehicle in ("rav4-2009", lab / "vehicle-1.yaml")]
         picture = DOCS / "effect.png"

@@ -1,6 +1,6 @@
 """The lab's loop: how a model comes to what it lacked, from the first comparison to the last effect.
 
-The steps, the story of them in words and for a program, and its page; beside it the page of ``demo field``.
+The steps, the story of them in words and for a program, and its page; beside it the page of ``demo --field``.
 """
 
 from __future__ import annotations

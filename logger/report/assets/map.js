@@ -221,7 +221,7 @@ class TrackMap {
     ink.stroke();
   }
 
-  // Street pictures of 256 pixels, only where the page was made with --base and an address.
+  // Street pictures of 256 pixels, only where the page was made with --tiles.
   drawTiles(ink, [west, north, east, south]) {
     const {tiles} = this.report.data;
     if (!tiles) return;

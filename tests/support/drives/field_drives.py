@@ -1,4 +1,4 @@
-"""Makes the drives of ``ridelog demo field``: ``python -m tests.support.drives.field_drives FILE.zip``.
+"""Makes the drives of ``ridelog demo --field``: ``python -m tests.support.drives.field_drives FILE.zip``.
 
 Three passes over a measured street and a fourth drive over the street beyond, as the bytes that a recorder in a car
 would have kept: two drives with a BMA220, two with an accelerometer on a serial line, each beside a GPS receiver whose
