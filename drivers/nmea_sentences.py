@@ -22,7 +22,6 @@ from drivers.readings import US_PER_S
 KNOT_MPS = 1852.0 / 3600.0
 KMH_MPS = 1.0 / 3.6
 
-
 MODES_WITH_FIX = (b"", b"A", b"D", b"F", b"P", b"R")
 QUALITIES_WITH_FIX = range(1, 6)
 
@@ -158,9 +157,10 @@ def _rmc(fields: list[bytes]) -> Rmc:
 
 def _gga(fields: list[bytes]) -> Gga:
     """time, lat, N/S, lon, E/W, quality, satellites, HDOP, altitude, M, geoid, M, age, station"""
+    lowest_m, highest_m = -1000.0, 20_000.0
     _expect(len(fields) == 14 and fields[9] in (b"M", b""))
     return Gga(_time_of_day_us(fields[0]), (_whole(fields[5], 8) or 0) in QUALITIES_WITH_FIX, *_position(fields[1:5]),
-               _whole(fields[6], 99), _dop(fields[7]), _number(fields[8], -1000.0, 20000.0))
+               _whole(fields[6], 99), _dop(fields[7]), _number(fields[8], lowest_m, highest_m))
 
 
 def _gll(fields: list[bytes]) -> Gll:
@@ -247,7 +247,8 @@ def _dop(field: bytes) -> float | None:
 
 
 def _speed_mps(field: bytes, unit_mps: float) -> float | None:
-    speed = _number(field, 0.0, 150.0 / unit_mps)
+    fastest_mps = 150.0
+    speed = _number(field, 0.0, fastest_mps / unit_mps)
     return None if speed is None else speed * unit_mps
 
 

@@ -37,7 +37,7 @@ def sampling_period(instants_us: Floats, count: int, slope_us: float, longest_ga
     lost_most        largest share of samples that may be lost
     """
     chance = 1e-6  # of a comb where there is none: tried each 1.28 s, once in 15 days of driving
-    # than the phases by the rate at which samples come; measured: 4 or more with losses, 1.2 at most without
+    # Than the phases by the rate at which samples come; measured: 4 or more with losses, 1.2 at most without.
     clearer = 2.0
     if count < 2 or slope_us <= 0:  # all of them at one moment have no period
         return None
@@ -65,11 +65,12 @@ def is_ticked(instants_us: Floats, period_us: float, longest_us: float) -> bool:
     """Tell whether arrivals (m,) [us] stand on the ticks of a timer of nearly a multiple of the samples' period, up to
     ``longest_us``: of the samples themselves all teeth are seen, not every second or third."""
     nearly = 0.008  # a timer farther off drifts by a sample in half a second, which shows in the jitter
+    ticked = 0.7  # resultant of arrivals on the ticks of one timer, 1 where all are
     step = 1.0 / (STEPS_PER_CYCLE * (instants_us[-1] - instants_us[0]))
     frequencies = [np.arange((1 - nearly) / multiple_us, (1 + nearly) / multiple_us, step)
                    for multiple_us in period_us * np.arange(2, 1 + longest_us // period_us)]
     tried = np.concatenate([np.empty(0), *frequencies])
-    return len(tried) > 0 and float(resultant(instants_us, 1.0 / tried).max()) > 0.7
+    return len(tried) > 0 and float(resultant(instants_us, 1.0 / tried).max()) > ticked
 
 
 def _coarsest(instants_us: Floats, period_us: float) -> float:
@@ -77,10 +78,10 @@ def _coarsest(instants_us: Floats, period_us: float) -> float:
     an adapter's timer, which samples of another period fill unevenly. By the Fourier transform of their histogram; 0
     where there is no longer period."""
     bin_us = 250.0  # of a period of 1 ms, the shortest, a quarter: the resultant is 10 % low there, 1 % at 3 ms
-    NEXT = 1.1  # a period so much longer has, over any length that is looked at, another comb
+    next_comb = 1.1  # a period so much longer has, over any length that is looked at, another comb
     bins = np.rint((instants_us - instants_us[0]) / bin_us).astype(np.int64)
     length = 1 << int(STEPS_PER_CYCLE // 2 * (bins[-1] + 1)).bit_length()
-    first, end = (int(length * bin_us / us) for us in (TIMER_US, NEXT * period_us))
+    first, end = (int(length * bin_us / us) for us in (TIMER_US, next_comb * period_us))
     if end <= first:
         return 0.0
     lines = np.abs(np.fft.rfft(np.bincount(bins), length)[first:end])

@@ -126,8 +126,9 @@ def _folded(data: bytes) -> int:
 
 def recognise(data: bytes) -> Contents:
     """What some thousand bytes of a line are."""
+    one_byte_share, least_text_share, fewest_sentences = 0.9, 0.9, 3
     framed = _frames(data)
-    if framed is None and data and max(data.count(byte) for byte in set(data)) >= 0.9 * len(data):
+    if framed is None and data and max(data.count(byte) for byte in set(data)) >= one_byte_share * len(data):
         byte = max(set(data), key=data.count)
         return Contents("level", f"hardly anything but the byte 0x{byte:02x}", "")
     sentences: dict[Checksum, list[bytes]] = {found: [] for found in Checksum}
@@ -138,7 +139,7 @@ def recognise(data: bytes) -> Contents:
         return framed
     lines, text_share = _text_lines(data)
     count = len(good) + len(bad) + len(unchecked)
-    if count >= 3 or 2 * count > len(lines) > 0:
+    if count >= fewest_sentences or 2 * count > len(lines) > 0:
         if len(good) > max(len(bad), len(unchecked)):
             malformed = [line for line in good if _is_malformed(line)]
             return Contents("malformed" if malformed else "sentences", _kinds(malformed or good),
@@ -146,7 +147,7 @@ def recognise(data: bytes) -> Contents:
         if len(unchecked) > len(bad):
             return Contents("no_checksum", _kinds(unchecked), _shown(unchecked[-1]))
         return Contents("damaged", f"{len(bad)} of {count}", _shown(bad[-1]))
-    if text_share < 0.9:
+    if text_share < least_text_share:
         return Contents("noise", "", f"the bytes {data[-12:].hex(' ')}" if data else "")
     if not lines:
         return Contents("endless", "", _shown(data))
@@ -156,13 +157,14 @@ def recognise(data: bytes) -> Contents:
 
 def _frames(data: bytes) -> Contents | None:
     """The protocol whose frames make most of the bytes; None where none does."""
+    largest_frame = 2048
     found: list[tuple[int, str, str]] = []
     for protocol in _PROTOCOLS:
         covered, at = 0, data.find(protocol.sync)
         while 0 <= at <= len(data) - protocol.head:
             size = protocol.size(data[at : at + protocol.head])
             frame = data[at : at + size]
-            right = protocol.head <= size <= 2048 and len(frame) == size and protocol.is_right(frame)
+            right = protocol.head <= size <= largest_frame and len(frame) == size and protocol.is_right(frame)
             covered += size if right else 0
             at = data.find(protocol.sync, at + (size if right else 1))
         found.append((covered, protocol.by, protocol.name))
@@ -187,6 +189,7 @@ def _stuffed_frames(data: bytes) -> list[tuple[int, str, str]]:
 def _chained(data: bytes, sync: int, more: int, number_at: int) -> int:
     """Bytes in frames whose second byte says their length and behind which the next one begins, numbered one higher;
     none where few numbers come: a line at a wrong baud rate has few values, which fit by chance."""
+    fewest_numbers = 4
     numbers: set[int] = set()
     covered, at = 0, data.find(sync)
     while 0 <= at < len(data) - number_at:
@@ -197,7 +200,7 @@ def _chained(data: bytes, sync: int, more: int, number_at: int) -> int:
             covered += end - at
             numbers.add(data[at + number_at])
         at = end if right else data.find(sync, at + 1)
-    return covered if len(numbers) >= 4 else 0
+    return covered if len(numbers) >= fewest_numbers else 0
 
 
 _SENTENCE = re.compile(rb"[$!](?:P[A-Z]{2}|[A-Z]{2}[A-Z\d]{3},)[ -#%-~]*")

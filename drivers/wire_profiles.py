@@ -41,8 +41,8 @@ class ScaleCalibration:
     @property
     def mps2_per_count(self) -> Triple:
         """Scale of X, Y, Z [m/s2 per count]."""
-        x, y, z = (STANDARD_GRAVITY_MPS2 / (one - zero) for zero,
-                   one in zip(self.zero_g_raw, self.one_g_raw, strict=True))
+        x, y, z = (STANDARD_GRAVITY_MPS2 / (one - zero)
+                   for zero, one in zip(self.zero_g_raw, self.one_g_raw, strict=True))
         return x, y, z
 
 

@@ -152,7 +152,8 @@ def _elements(channels: Any) -> tuple[dict[str, Element], int]:
     """Each channel's place in a scan, and the size of a scan."""
     placed: dict[str, Element] = {}
     position = largest = 0
-    if len(channels) > 64:
+    most_channels = 64
+    if len(channels) > most_channels:
         raise ValueError("too many channels")
     ordered = sorted((int(index), str(name), str(kind)) for name, index, kind in channels)
     if any(before[0] == after[0] for before, after in pairwise(ordered)):

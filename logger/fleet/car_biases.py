@@ -349,7 +349,8 @@ def _fitted(design: Elimination) -> tuple[Array, Array]:
     total = design.by_road(weight)
     effects, growth = np.zeros(design.cars + 1), np.zeros(design.roads)
     residual = np.zeros(len(iri))
-    for _ in range(50):
+    most_steps, close = 50, 1e-9
+    for _ in range(most_steps):
         grown = 1.0 + (effects[-1] + growth[road]) * design.time
         expected = np.exp(effects[design.car]) * np.maximum(grown, least_grown)
         level = design.by_road(weight * iri / expected) / total
@@ -359,17 +360,17 @@ def _fitted(design: Elimination) -> tuple[Array, Array]:
         change = float(np.abs(found - effects).max())
         effects = found
         growth = design.slopes(working - design.of_effects(effects))
-        if change < 1e-9:
+        if change < close:
             break
     return effects, residual
 
 
 def _variances(design: Elimination, residual: Array) -> Variances:
     """The three variances whose expected quadratic forms are those of the residuals; none is below zero."""
-    # Random signs for a trace: a few of a large data set, many of a small one, so that its error stays below 1 %.
-    probed = 500_000
     from scipy.optimize import nnls
 
+    # Random signs for a trace: a few of a large data set, many of a small one, so that its error stays below 1 %.
+    probed, least_freedom = 500_000, 1e-6
     passes = design.passes
     sessions = len(passes.car_of_session)
     random = np.random.default_rng(1)
@@ -386,7 +387,7 @@ def _variances(design: Elimination, residual: Array) -> Variances:
     found, forms = _quadratic(design, residual), np.stack([expected(of) for of in range(3)], axis=1)
     # What is left of a form after cars and roads: nothing where, say, no road has been driven at three times.
     whole = np.array([len(passes.count), sessions, float(passes.count @ design.time**2)])
-    shown = np.diag(forms) > 1e-6 * whole
+    shown = np.diag(forms) > least_freedom * whole
     scale = 1.0 / np.where(shown, forms.max(axis=1), 1.0)
     solved = np.zeros(3)
     solved[shown] = nnls((forms * scale[:, None])[np.ix_(shown, shown)], (found * scale)[shown])[0]

@@ -283,7 +283,8 @@ def headings(lat_deg: Array, lon_deg: Array, drive: npt.NDArray[np.intp]) -> Arr
     east = (lon_deg[after] - lon_deg[before] + 180.0) % 360.0 - 180.0
     east = east * np.cos(np.radians(lat_deg))
     moved_m = np.hypot(north, east) * (np.pi / 180.0 * EARTH_RADIUS_M)
-    return np.where(moved_m >= 1.0, np.degrees(np.arctan2(east, north)) % 360.0, np.nan)
+    least_move_m = 1.0
+    return np.where(moved_m >= least_move_m, np.degrees(np.arctan2(east, north)) % 360.0, np.nan)
 
 
 def _inside(rows: Mapping[str, npt.NDArray[Any]], drive: npt.NDArray[np.intp], trim_m: float) -> npt.NDArray[np.bool_]:

@@ -131,7 +131,7 @@ def not_known(figures: FleetFigures) -> str:
 
 def _words_cars(figures: FleetFigures) -> list[str]:
     shown_cars = 10
-    SURE = 2.0  # Standard errors that a bias is listed from.
+    sure_stds = 2.0  # Standard errors that a bias is listed from.
     biases = figures.biases
     bias, std = biases.gain - 1.0, biases.gain * biases.log_std
     if not isfinite(biases.pass_std):
@@ -141,7 +141,7 @@ def _words_cars(figures: FleetFigures) -> list[str]:
     if not biases.known.any():
         return ["No road has passes of two cars: nothing is known of their biases"]
     order = np.argsort(-np.abs(bias) * biases.known, kind="stable")
-    sure = [one for one in order.tolist() if biases.known[one] and abs(bias[one]) > SURE * std[one]]
+    sure = [one for one in order.tolist() if biases.known[one] and abs(bias[one]) > sure_stds * std[one]]
     alone = int((~biases.known).sum())
     lines = [f"Cars that differ from the mean car ({len(sure)} of {len(bias)})"]
     width = max((len(figures.names[one]) for one in sure[:shown_cars]), default=0)

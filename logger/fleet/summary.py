@@ -66,9 +66,10 @@ def passes_by_session(rows: ir.Table, since_us: int | None, until_us: int | None
                       ) -> ir.Table:
     """Means over passes by road, car and session, of one road in so many: by the remainder of the key, first by a
     prime, as the last bits of a key are a direction."""
+    prime = 1_000_003
     passes = _passes(rows, since_us, until_us)
     if one_in > 1:
-        passes = passes.filter((passes.road % 1_000_003) % one_in == 0)
+        passes = passes.filter((passes.road % prime) % one_in == 0)
     passes = passes.mutate(years=(passes.utc_us - zero_us).cast("float64") / YEAR_US)
     return passes.group_by(["road", "car", "session"]).aggregate(
         passes=passes.count(), iri=passes.pass_iri_m_per_km.mean(), years=passes.years.mean())
@@ -363,7 +364,8 @@ def change_found(roads: RoadTable) -> float:
         return np.nan
     called = significant(roads.p_value, FALSE_SHARE)
     at_p = float(roads.p_value[called].max()) if called.any() else FALSE_SHARE / int(known.sum())
-    needed = float(norm.isf(at_p / 2) + norm.ppf(0.8))
+    power = 0.8
+    needed = float(norm.isf(at_p / 2) + norm.ppf(power))
     return needed * float(np.median(roads.trend_std_m_per_km_per_year[known]))
 
 

@@ -303,7 +303,8 @@ class VehicleModel(DriveModel):
 
     def _moved(self, road: RoadInTime, run: int, values: Array, index: int, change: Sensitivity | None
                ) -> Complex | None:
-        """Derivative (f, w) of the road under the wheels in a run by a free number; None where it moves nothing."""
+        """Derivative (f, w) of the road under the wheels in a run by a free number, what lies on it by differences to
+        both sides unless it is at a bound; None where it moves nothing."""
         if change is not None:
             if not change.shifts_road:
                 return None
@@ -312,11 +313,12 @@ class VehicleModel(DriveModel):
             return np.asarray((after - before) / change.apart)
         one, structure = self.parameters[index], structure_of(self.vehicle_with(values))
         step = _INPUT_STEP * (1.0 if one.place else values[index]) * (_OF_SPEED if SPEED_SCALE in one.name else 1.0)
-        ends = [self.road_with(values + way * step * (np.arange(len(values)) == index), run) for way in (-1, 1)]
-        if ends[0] == ends[1]:
+        ends = np.clip(values[index] + step * np.array([-1.0, 1.0]), one.low, one.high)
+        inputs = [self.road_with(np.where(np.arange(len(values)) == index, end, values), run) for end in ends]
+        if inputs[0] == inputs[1]:
             return None
-        before, after = (road.under_wheels(structure, end) for end in ends)
-        return np.asarray((after - before) / (2 * step))
+        before, after = (road.under_wheels(structure, one) for one in inputs)
+        return np.asarray((after - before) / (ends[1] - ends[0]))
 
 
 # Steps of differences by what lies on the road: over places [m], as shares of sizes, of the latter's for a factor of

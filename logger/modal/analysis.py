@@ -51,9 +51,10 @@ class _Plan:
 
 def decays(samples: Array) -> bool:
     """Whether a record (samples, channels) looks like a free decay: its first third much louder than the second."""
+    decay_ratio = 3.0
     thirds = np.array_split(samples - samples[-len(samples) // 3:].mean(axis=0), 3)
     power = [float((third**2 / np.maximum(samples.var(axis=0), 1e-300)).mean()) for third in thirds]
-    return power[0] > 3.0 * power[1] and power[1] > 0.8 * power[2]
+    return power[0] > decay_ratio * power[1] and power[1] > 0.8 * power[2]
 
 
 def find_modes(samples: Array, rate_hz: float, inputs: Array | None = None, decay: bool | None = None) -> ModalResult:
@@ -63,7 +64,7 @@ def find_modes(samples: Array, rate_hz: float, inputs: Array | None = None, deca
 
     ValueError for a record that is too short or a channel that never moves, or an input that shows no mode.
     """
-    shortest = 100  # samples
+    shortest, most_segments, diagram_orders = 100, 30, 24
     if len(samples) < shortest:
         raise ValueError(f"expected at least {shortest} samples, found {len(samples)}")
     if inputs is None and (decays(samples) if decay is None else decay):
@@ -74,7 +75,7 @@ def find_modes(samples: Array, rate_hz: float, inputs: Array | None = None, deca
         raise ValueError("expected channels that differ, found one that is a sum of others: leave it out")
     whole = samples if inputs is None else np.hstack([samples, inputs])
     plan = _plan((whole - whole.mean(axis=0)) / whole.std(axis=0), samples.shape[1], rate_hz)
-    segments = segment_products(plan.data, plan.lags, min(30, len(samples) // (2 * plan.lags)))
+    segments = segment_products(plan.data, plan.lags, min(most_segments, len(samples) // (2 * plan.lags)))
     moments = segments.whole()
     chosen = plan.best(moments)
     how = (f"response to unmeasured random forces: {METHODS['ssi']}" if inputs is None else
@@ -82,7 +83,7 @@ def find_modes(samples: Array, rate_hz: float, inputs: Array | None = None, deca
     if chosen == 0:
         return ModalResult((), (), 0, f"{how}; no model explains more than its parameters cost")
     place = plan.orders.index(chosen)
-    thinned = plan.orders[place::-(place // 24 + 1)][::-1]
+    thinned = plan.orders[place::-(place // diagram_orders + 1)][::-1]
     diagram = plan.models(moments, thinned + plan.orders[place + 1:place + 1 + _BEYOND])
     place = len(thinned) - 1
     found = diagram[place] if inputs is not None else _without_bias(diagram[place], len(samples) / rate_hz)
@@ -123,7 +124,8 @@ def _plan(data: Array, outputs: int, rate_hz: float) -> _Plan:
         raise ValueError(f"expected at least {24 * channels} samples for {channels} channels, found {len(data)}")
     needed = max(_memory(data, outputs, longest), _LEAST_PAST)
     horizon = min(needed, longest, max(_MOST_PAST // channels, 30))
-    most = min(40 + _BEYOND, (horizon - 1) * outputs) // 2 * 2
+    most_states = 40
+    most = min(most_states + _BEYOND, (horizon - 1) * outputs) // 2 * 2
     if channels > outputs:
         most = min(most, (_excitation(data[:, outputs:], rate_hz, 2 * most + 1) - 1) // 4 * 2)
     orders = list(range(2, most + 1, 2))

@@ -89,9 +89,9 @@ def decay_modes(samples: Array, rate_hz: float, propose: Propose, how: str) -> M
 
 def _threshold(samples: int, channels: int) -> float:
     """Chi-squared that the best of all frequencies reaches by chance once in a thousand records of noise."""
-    false_alarm = 1e-3  # chance that a record of noise yields a mode
     from scipy.special import chdtri
 
+    false_alarm = 1e-3  # chance that a record of noise yields a mode
     return float(chdtri(2 * channels + 2, false_alarm / samples))
 
 
@@ -135,7 +135,8 @@ def _normal_equations(fit: _Fit, rate_hz: float) -> tuple[Array, Array]:
 
 def _refit(fit: _Fit, samples: Array, rate_hz: float) -> _Fit:
     """Gauss-Newton on the poles, each step shortened until it helps."""
-    for _ in range(60):
+    most_steps = 60
+    for _ in range(most_steps):
         information, gradient = _normal_equations(fit, rate_hz)
         scale = np.sqrt(np.maximum(np.diag(information), 1e-300))
         step = np.linalg.lstsq(information / np.outer(scale, scale), gradient / scale, rcond=1e-10)[0] / scale
@@ -218,11 +219,12 @@ def _take_in(fit: _Fit, samples: Array, diagram: tuple[OrderPoles, ...], rate_hz
     than it are given up.
     """
     ahead = 4  # poles that are tried beyond those that are believed
+    most_modes = 40
     proposed = _different(np.concatenate([np.empty(0, complex), *(found.poles for found in diagram)]),
                           len(samples) / rate_hz)
     waves = _basis(proposed, len(samples), rate_hz)
     believed = fit
-    while len(proposed) and len(fit.poles) < min(40, len(believed.poles) + ahead):
+    while len(proposed) and len(fit.poles) < min(most_modes, len(believed.poles) + ahead):
         gains = _gains(fit, waves)
         fair = (gains / np.maximum(1.0, _louder_meanwhile(fit, proposed, rate_hz))).sum(axis=1)
         best = int(fair.argmax() if fair.max() >= threshold else gains.sum(axis=1).argmax())
@@ -242,8 +244,8 @@ def _take_in(fit: _Fit, samples: Array, diagram: tuple[OrderPoles, ...], rate_hz
 
 def _bounded(poles: Complex, duration_s: float) -> npt.NDArray[np.bool_]:
     """Which poles grow little enough, if at all, to be those of a record of this duration."""
-    most_growth = 10.0  # in powers of e, from the first sample to the last
-    return np.asarray((damping_ratio(poles) > -0.05) & (poles.real * duration_s < most_growth))
+    least_damping, most_growth = -0.05, 10.0  # the latter in powers of e, from the first sample to the last
+    return np.asarray((damping_ratio(poles) > least_damping) & (poles.real * duration_s < most_growth))
 
 
 def _different(poles: Complex, duration_s: float) -> Complex:
@@ -348,13 +350,13 @@ def log_decrement(samples: Array, rate_hz: float) -> Decrement:
 
     ValueError when fewer than four peaks rise above a tenth of the first.
     """
-    FADED = 0.1  # of the first peak: what is below is left to the noise
+    faded_share = 0.1  # of the first peak: what is below is left to the noise
     fewest_peaks = 4
     wave, strongest_hz = _alone(samples, rate_hz)
     top = np.flatnonzero((wave[1:-1] > wave[:-2]) & (wave[1:-1] >= wave[2:]) & (wave[1:-1] > 0)) + 1
     edge = rate_hz / strongest_hz  # the cut rings at both ends
     top = top[(top > edge) & (top < len(wave) - edge)]
-    faded = np.flatnonzero(wave[top] < FADED * wave[top].max(initial=0.0)) if len(top) else np.empty(0, int)
+    faded = np.flatnonzero(wave[top] < faded_share * wave[top].max(initial=0.0)) if len(top) else np.empty(0, int)
     top = top[:faded[0]] if len(faded) else top
     if len(top) < fewest_peaks:
         raise ValueError(f"expected at least {fewest_peaks} peaks of one vibration, found {len(top)}")
@@ -397,15 +399,16 @@ def _slope(values: Array) -> tuple[float, float]:
 def proposals(samples: Array, rate_hz: float) -> tuple[OrderPoles, ...]:
     """Poles of the orders 2, 4, ... 40 of a free decay (samples, channels)."""
     rank = 1e-7  # relative size of what is left of a noise-free record, decomposed by its squares, which is quick
+    most_rows, most_columns, most_states = 300, 400, 40
     count, channels = samples.shape
-    rows = max(2, min(300 // channels, count // 2))
-    columns = max(1, min(400, count - rows))
+    rows = max(2, min(most_rows // channels, count // 2))
+    columns = max(1, min(most_columns, count - rows))
     blocks = samples[np.arange(rows)[:, None] + np.arange(columns + 1)]  # (rows, columns + 1, channels)
     whole = blocks.transpose(0, 2, 1).reshape(rows * channels, columns + 1)
     early, late = whole[:, :-1], whole[:, 1:]
     squares, left = np.linalg.eigh(early @ early.T)
     sizes, left = np.sqrt(np.maximum(squares[::-1], 0.0)), left[:, ::-1]
-    n = max(1, min(40, int((sizes > rank * sizes[0]).sum())))
+    n = max(1, min(most_states, int((sizes > rank * sizes[0]).sum())))
     left, root = left[:, :n], np.sqrt(np.maximum(sizes[:n], 1e-300))
     transition = left.T @ late @ ((left.T @ early) / sizes[:n, None]).T / np.outer(root, root)
     observe = left[:channels] * root

@@ -124,9 +124,10 @@ class SensorRecord:
 
 def structure(stiffness_n_per_m: float | None = None) -> Masses:
     """Mass, damping and stiffness of the building, damping ratio 1.34 % in every mode."""
-    floor_kg = 0.346
-    middle = 7.5 * 2.2e9 * 33.873e-12 / 0.142875**3
-    top_kg = floor_kg + 2 * 0.35834 + 0.112 + 0.048 + 0.078
+    floor_kg, clamp_kg, phone_kg, sensor_kg, airlink_kg = 0.346, 0.35834, 0.112, 0.048, 0.078
+    elasticity_pa, second_moment_m4, clear_height_m = 2.2e9, 33.873e-12, 0.142875
+    middle = 7.5 * elasticity_pa * second_moment_m4 / clear_height_m**3
+    top_kg = floor_kg + 2 * clamp_kg + phone_kg + sensor_kg + airlink_kg
     mass, stiffness = chain(np.array([floor_kg] * 4 + [top_kg]), np.full(5, stiffness_n_per_m or middle))
     return with_damping_ratios(mass, stiffness, np.full(5, DAMPING_RATIO))
 
@@ -142,11 +143,11 @@ def released(building: Masses, samples: int = round(DURATION_S * RATE_HZ)) -> Ar
 
     As strong as to give the first peak of Eq 5.3 at the top.
     """
-    first_peak_s = 1.19
+    first_peak_g, first_peak_s = 0.1978, 1.19
     pulled = np.linalg.solve(building.stiffness, np.eye(5)[4])
     accel = free_decay(building, pulled / pulled[4], RATE_HZ, samples)
     around = slice(int((first_peak_s - 0.4) * RATE_HZ), int((first_peak_s + 0.4) * RATE_HZ))
-    return accel * 0.1978 * STANDARD_GRAVITY_MPS2 / np.abs(accel[around, 4]).max()
+    return accel * first_peak_g * STANDARD_GRAVITY_MPS2 / np.abs(accel[around, 4]).max()
 
 
 def recorded(accel_mps2: Array, sensor: FloorSensor, seed: int) -> Array:

@@ -142,11 +142,12 @@ def judge(found: OrderPoles, covariance: Array, larger: list[OrderPoles], scale:
     scale         (channels,) what the channels were divided by
     duration_s    of the record: it resolves no less than 1 / duration
     """
+    known_well_stds, neighbours = 6.0, 4
     modes: list[FoundMode] = []
     rejected: list[Rejected] = []
     for k, pole in enumerate(found.poles):
-        is_known_well = 6.0**2 * np.trace(covariance[k]) < pole.real**2
-        near = [] if is_known_well else larger[:4]
+        is_known_well = known_well_stds**2 * np.trace(covariance[k]) < pole.real**2
+        near = [] if is_known_well else larger[:neighbours]
         moves = _moves(complex(pole), near)
         both = covariance[k] + (np.outer(middle := moves[len(moves) // 2], middle) if len(moves) else 0.0)
         frequency, ratio = float(frequency_hz(pole)), float(damping_ratio(pole))
@@ -173,14 +174,15 @@ def _moves(pole: complex, larger: list[OrderPoles]) -> Array:
 
 
 def _why_not(pole: complex, frequency_std_hz: float, damping_std: float, moves: Array, models: int) -> str:
+    hum_damping, no_damping, must_have_it = 5e-4, 1e-6, 3
     hz, ratio = abs(pole) / (2 * np.pi), -pole.real / abs(pole)
     reasons = {
         "parts of the record do not have it": not np.isfinite(frequency_std_hz),
         "it grows instead of decaying": ratio <= 0,
         "damped so heavily that it hardly swings": ratio > _MOST_DAMPING,
-        "no damping to be seen: a hum, not a mode": ratio < max(1e-6, min(5e-4, 2 * damping_std)),
+        "no damping to be seen: a hum, not a mode": ratio < max(no_damping, min(hum_damping, 2 * damping_std)),
         f"its frequency is uncertain by {frequency_std_hz / hz:.0%}": frequency_std_hz > LARGEST_FREQUENCY_ERROR * hz,
         f"its damping ratio is uncertain by {damping_std:.2f}": damping_std > LARGEST_DAMPING_ERROR,
-        f"only {len(moves)} of the next {models} orders have it": len(moves) < min(3, models),
+        f"only {len(moves)} of the next {models} orders have it": len(moves) < min(must_have_it, models),
     }
     return next((reason for reason, holds in reasons.items() if holds), "")

@@ -257,8 +257,8 @@ def _pieces(height: Array, slope: Array, bend: Array, width: Array) -> Array:
     return np.stack([np.concatenate([[0.0], np.cumsum(gain[:-1])]), height, slope, bend])
 
 
-def _averages(heights: Array, spacing_m: float, patch_m: float, whole: int, second: float, cells: int) -> tuple[Array,
-                                                                                                                Array]:
+def _averages(heights: Array, spacing_m: float, patch_m: float, whole: int, second: float, cells: int
+              ) -> tuple[Array, Array]:
     """Elevation averaged over the patch, and its slope, at the knots in order.
 
     The patch is ``whole`` and ``second`` spacings long. At the first knot of a cell its front edge passes a sample, at

@@ -307,12 +307,13 @@ def steps_figure(one: Steps) -> Html:
     points = [(index + 0.5, value) for index, (_, value) in enumerate(one.values)]
     if count > 1:
         parts.append(html('<path class="thick s0" d="M{}"/>', " ".join(frame.points(points))))
+    line_px, most_lines = 15, 3
     letters = max(8, int((_STEPS.right_px - _STEPS.left) / count / _LETTER_PX))
     for (at, value), (words, _) in zip(points, one.values, strict=True):
         x, y = frame.x(at), frame.y(value)
         parts += [_dot(x, y, 5, 0), _words(x, y - 10, f"{value:.3f}", "middle")]
-        parts += [_words(x, _STEPS.bottom_px + 18 + 15 * number, line, "middle")
-                  for number, line in enumerate(wrap(words, letters)[:3])]
+        parts += [_words(x, _STEPS.bottom_px + 18 + line_px * number, line, "middle")
+                  for number, line in enumerate(wrap(words, letters)[:most_lines])]
     return _figure(_STEPS, one.title, [*parts, _words(_STEPS.left, _STEPS.top - 10, one.unit)], "plot named")
 
 
@@ -348,7 +349,8 @@ def drawn(charts: Sequence[Chart], path: Path) -> bytes:
         from matplotlib.figure import Figure
     except ImportError as error:
         raise BadInput(f"{path}: expected the 'report' extra: pip install 'ridelog[report]' ({error})") from None
-    figure = Figure(figsize=(8.0, 3.6 * len(charts)), dpi=150, layout="constrained")
+    width_in, height_in = 8.0, 3.6
+    figure = Figure(figsize=(width_in, height_in * len(charts)), dpi=150, layout="constrained")
     FigureCanvasAgg(figure)
     for one, axes in zip(charts, np.atleast_1d(figure.subplots(len(charts), squeeze=False)[:, 0]), strict=True):
         axes.set_title(one.title, loc="left", fontsize=10, fontweight="bold")

@@ -105,7 +105,8 @@ class _Projection:
 
 
 def _path(points: Sequence[Point]) -> str:
-    kept = [f"{x:.1f} {y:.1f}" for x, y in simplified(points, 0.3)]
+    tolerance = 0.3  # of a unit of the picture
+    kept = [f"{x:.1f} {y:.1f}" for x, y in simplified(points, tolerance)]
     return "M" + (" ".join(kept) if len(kept) > 1 else f"{kept[0]}h0")
 
 

@@ -174,8 +174,8 @@ def _shares(shares: Sequence[Share], names: tuple[str, ...], words_of: Callable[
 def _places_section(records: Sequence[WindowRecord], places: Sequence[RoughWindow]) -> Html:
     rows = [(number_button(index, number), str(place.drive), _instant(place.utc_us), _geo(place),
              distance_words(place.along_m), iri_words(place), _number(place.speed_mps, 0, factor=3.6),
-             _number(place.a_w_mps2, 2), comfort_words(place.comfort), " ".join(place.flags)) for number,
-            (index, place) in enumerate(zip(_numbers(records, places), places, strict=True), start=1)]
+             _number(place.a_w_mps2, 2), comfort_words(place.comfort), " ".join(place.flags))
+            for number, (index, place) in enumerate(zip(_numbers(records, places), places, strict=True), start=1)]
     if not rows:
         return EMPTY
     heads = ("#", "Drive", "When (UTC)", "Coordinates", "Distance", "IRI [m/km]", "Speed [km/h]", _A_W, "Comfort",
@@ -257,12 +257,13 @@ def _sensor_note(sensor: Any) -> str:
 
 
 def _settings_section(files: Sequence[LoggedFile]) -> Html:
+    most, most_characters = 10, 20_000
     different = _different({key: value for key, value in file.sidecar.items() if key not in ("log", "clock_map")}
                            for file in files if file.sidecar)
     if not different:
         return EMPTY
-    texts = [json.dumps(content, indent=2, ensure_ascii=False) for content in different[:10]]
-    blocks = concatenated(html("<pre>{}</pre>", text[:20_000]) for text in texts)
+    texts = [json.dumps(content, indent=2, ensure_ascii=False) for content in different[:most]]
+    blocks = concatenated(html("<pre>{}</pre>", text[:most_characters]) for text in texts)
     return html("<details><summary>Settings, vehicle and versions</summary>{}</details>", blocks)
 
 

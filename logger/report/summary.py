@@ -176,17 +176,18 @@ def _shares(records: Sequence[WindowRecord], lengths_m: Sequence[float], names: 
 
 
 def _roughest(records: Sequence[WindowRecord]) -> tuple[RoughWindow, ...]:
+    nearest_m, most = 50.0, 5
     numbered = [(number, record) for number, drive in enumerate(split_drives(records), start=1) for record in drive]
     candidates = [RoughWindow(drive, along, record.utc_us, record.lat_deg, record.lon_deg, record.speed_mps,
                               record.iri_m_per_km, record.iri_std_m_per_km, record.a_w_mps2, record.comfort,
-                              record.flags) for (drive, record),
-                  along in zip(numbered, along_m(records), strict=True) if record.iri_m_per_km is not None
-                  and not _DOUBTFUL.intersection(record.flags)]
+                              record.flags)
+                  for (drive, record), along in zip(numbered, along_m(records), strict=True)
+                  if record.iri_m_per_km is not None and not _DOUBTFUL.intersection(record.flags)]
     found: list[RoughWindow] = []
     for place in sorted(candidates, key=lambda place: -place.iri_m_per_km):
-        if all(_apart_m(place, other) >= 50.0 for other in found):
+        if all(_apart_m(place, other) >= nearest_m for other in found):
             found.append(place)
-            if len(found) == 5:
+            if len(found) == most:
                 break
     return tuple(found)
 
@@ -300,10 +301,10 @@ def _bar(share: float, drawn: bool) -> str:
 def _places(places: Sequence[RoughWindow]) -> list[str]:
     if not places:
         return ["  none with a value"]
+    speeds = ["" if place.speed_mps is None else f", {place.speed_mps * 3.6:.0f} km/h" for place in places]
     return [f"  {number}. IRI {iri_words(place):>11} m/km  at {place_words(place):>20}  "
-            f"({distance_words(place.along_m)} along{'' if place.speed_mps is None else ', '}"
-            f"{'' if place.speed_mps is None else f'{place.speed_mps * 3.6:.0f} km/h'}) {comfort_words(place.comfort)}"
-            for number, place in enumerate(places, start=1)]
+            f"({distance_words(place.along_m)} along{speed}) {comfort_words(place.comfort)}"
+            for number, (place, speed) in enumerate(zip(places, speeds, strict=True), start=1)]
 
 
 def _can_encode(text: str, encoding: str) -> bool:

@@ -339,6 +339,7 @@ def _best_chain(network: RoadNetwork, trace: Trace, receiver: Receiver, start: _
     """Candidate of each window (n,), NO_WAY for none, the filtered errors (n, 5) along that chain, and how likely each
     window is to lie on its street (n,)."""
     count = len(trace.t_s)
+    most_chains = 16
     lists = _Lists.of(network, found, count)
     spread = 2 * receiver.std_m**2
     chains = [_Chain(0.0, NO_WAY, False, NO_WAY, start or (0.0, 0.0, spread, 0.0, spread), (0.0, 0.0), -1)]
@@ -361,7 +362,7 @@ def _best_chain(network: RoadNetwork, trace: Trace, receiver: Receiver, start: _
             new = [chain._replace(candidate=NO_WAY, known=False, parent=number, rivals=()) for number, chain in ahead]
         best = max(map(_score, new))
         likely = (chain for chain in new if chain.score > best - _WORST)
-        chains = sorted(likely, key=_score, reverse=True)[:16]
+        chains = sorted(likely, key=_score, reverse=True)[:most_chains]
         history.append(chains)
         before = here
     path, states = _traced_back(history)

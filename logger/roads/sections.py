@@ -92,7 +92,7 @@ def errors_of_means(errors: WindowErrors, iri: Array, at_m: Array, length_m: Arr
                                    that it counts in; those of one mean stand together, in the order driven, and are of
                                    different windows
     """
-    point_share = pi / 2 - 1
+    point_share, faded = pi / 2 - 1, 1e-3
     of_windows, whole_m = errors.of(window), length_m[window]
     level_std, common_std, place_std = of_windows.parts()
     level_std = level_std * piece_m
@@ -106,7 +106,7 @@ def errors_of_means(errors: WindowErrors, iri: Array, at_m: Array, length_m: Arr
     level = total(level_std**2)
     for lag in range(1, len(group)):
         apart_m = np.abs(at_m[window[lag:]] - at_m[window[:-lag]])
-        near = (group[lag:] == group[:-lag]) & (apart_m < -ALONG_M * log(1e-3))
+        near = (group[lag:] == group[:-lag]) & (apart_m < -ALONG_M * log(faded))
         if not near.any():
             break
         pairs = 2 * level_std[lag:] * level_std[:-lag] * np.exp(-apart_m / ALONG_M)

@@ -72,6 +72,13 @@ def found(car: Vehicle, records: list[Run], road: RoadInput, *names: str, **star
     return fit(one, one.measured)
 
 
+def test_derivatives_at_the_bounds_of_an_obstacle_stay_within_them() -> None:
+    road = RoadInput(bump=Bump(2.0, 1.0, 50.0))
+    one = model(HALF, [on_flat_road(HALF)], road, HEIGHT, WIDTH)
+    predicted, slopes = one.linearised(np.array([1.0, 50.0]))
+    np.testing.assert_allclose(slopes[0][:, 0], predicted[0], rtol=1e-5, atol=1e-5 * np.abs(predicted[0]).max())
+
+
 def test_predictions_are_those_of_the_simulation() -> None:
     record = on_flat_road(HALF)
     clean = bump_record(HALF, noise_mps2=0.0).measured_mps2

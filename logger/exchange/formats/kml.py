@@ -40,7 +40,7 @@ def _styles() -> Iterator[str]:
     for name, colour in colours.items():
         # KML writes opacity first, then blue, green, red.
         turned = f"ff{colour[5:7]}{colour[3:5]}{colour[1:3]}"
-        yield (f'<Style id="class-{name}"><LineStyle><color>{turned}</color><width>{4}</width></LineStyle>'
+        yield (f'<Style id="class-{name}"><LineStyle><color>{turned}</color><width>4</width></LineStyle>'
                f"<IconStyle><color>{turned}</color></IconStyle></Style>\n")
 
 

@@ -100,7 +100,7 @@ def _solve_scaled(information: Array, gradient: Array) -> Array:
 
 
 def fit_percent(error: float) -> float:
-    """The fit per cent of a normalised r.m.s. error."""
+    """The fit per cent of a normalised r.m.s. error (L. Ljung, System Identification, 1999: "best fit")."""
     return 100 * (1 - error)
 
 

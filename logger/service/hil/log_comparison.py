@@ -288,18 +288,20 @@ def _last_pass(rows: Sequence[WindowRecord]) -> Sequence[WindowRecord]:
 
 def _anchors(expected: Sequence[WindowRecord], rows: Sequence[WindowRecord]) -> list[Pair]:
     """Rows that begin at about the same UTC."""
+    same_utc_us = 500_000
     dated = sorted(((row.utc_us, row) for row in rows if row.utc_us is not None), key=lambda entry: entry[0])
     times = [utc_us for utc_us, _ in dated]
     pairs = []
     for wanted in expected:
         near = _nearest(times, wanted.utc_us) if wanted.utc_us is not None else None
-        if near is not None and abs(times[near] - (wanted.utc_us or 0)) <= 500_000:
+        if near is not None and abs(times[near] - (wanted.utc_us or 0)) <= same_utc_us:
             pairs.append((wanted, dated[near][1]))
     return pairs
 
 
 def _pairs(expected: Sequence[WindowRecord], rows: Sequence[WindowRecord], shift_us: int) -> list[Pair]:
     """Each expected row with the one that is the same window; none is taken twice."""
+    same_start_m, same_start_us = 1.0, 1_000_000
     by_distance = [row for row in rows if row.distance_start_m is not None]
     by_time = [row for row in rows if row.distance_start_m is None]
     starts_m = [row.distance_start_m or 0.0 for row in by_distance]
@@ -310,11 +312,11 @@ def _pairs(expected: Sequence[WindowRecord], rows: Sequence[WindowRecord], shift
         if wanted.distance_start_m is None:
             near = _nearest(starts_us, wanted.t_us + shift_us)
             found = by_time[near] if near is not None else None
-            same = found is not None and abs(found.t_us - wanted.t_us - shift_us) <= 1_000_000
+            same = found is not None and abs(found.t_us - wanted.t_us - shift_us) <= same_start_us
         else:
             near = _nearest(starts_m, wanted.distance_start_m)
             found = by_distance[near] if near is not None else None
-            same = found is not None and abs((found.distance_start_m or 0.0) - wanted.distance_start_m) <= 1.0
+            same = found is not None and abs((found.distance_start_m or 0.0) - wanted.distance_start_m) <= same_start_m
         if found is not None and same and found.segment not in taken:
             taken.add(found.segment)
             pairs.append((wanted, found))
@@ -375,7 +377,8 @@ def _difference(tolerance: RowTolerance, pairs: Sequence[Pair]) -> Difference:
 
 
 def _may_be_outside(count: int) -> int:
-    return max(1, int(0.02 * count))
+    outside_share = 0.02
+    return max(1, int(outside_share * count))
 
 
 def _median(values: Sequence[float]) -> float:

@@ -26,10 +26,11 @@ _CUT = "cut short: expected a last line '# N files, list SHA-256'"
 
 def list_blocks(first: str, entries: Iterable[str]) -> Iterator[bytes]:
     """The text of a list with this first line, in blocks."""
+    lines_per_block = 1000
     digest = hashlib.sha256()
     count = -1
     lines = chain([first], entries)
-    while some := list(islice(lines, 1000)):
+    while some := list(islice(lines, lines_per_block)):
         block = "".join(f"{line}\n" for line in some).encode("ascii")
         digest.update(block)
         count += len(some)

@@ -119,8 +119,10 @@ def _remember(log_folder: DirectoryHandle, home: _Home) -> None:
 
 
 def _homes(log_folder: DirectoryHandle) -> Iterator[_Home]:
+    """The lines that can be read."""
+    most_bytes = 65_536
     try:
-        text = log_folder.read(HOMES_NAME, 65_536).decode("ascii")
+        text = log_folder.read(HOMES_NAME, most_bytes).decode("ascii")
     except (OSError, ValueError):
         return
     for line in text.splitlines():

@@ -241,8 +241,8 @@ def _utf16(data: bytes) -> str | None:
     """By its mark or, without one, by the zero in each second byte of ASCII."""
     if data.startswith((b"\xff\xfe", b"\xfe\xff")):
         return "utf-16"
-    first = data[:256]
-    if len(first) < 4 or 0 not in first:
+    first, shortest = data[:256], 4
+    if len(first) < shortest or 0 not in first:
         return None
     return next((code for code, zeros, others in (("utf-16-le", first[1::2], first[::2]),
                                                   ("utf-16-be", first[::2], first[1::2]))

@@ -28,7 +28,7 @@ Array = npt.NDArray[np.float64]
 
 _MOST_BYTES = 1 << 28
 _ORDERS = {b"IM": "<", b"MI": ">"}
-_COMPRESSED = 15
+_MATRIX, _COMPRESSED = 14, 15  # kinds of elements
 _NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
 _NUMERIC = range(6, 16)  # classes of matrices: double, single and whole numbers
 
@@ -108,8 +108,10 @@ def _subsystem(path: Path, held: Array) -> list[Array]:
 
 def _rows(matrices: list[_Matrix] | tuple[_Matrix, ...]) -> Iterator[Array]:
     """Every row of floating numbers in nested cells, structures and objects."""
+    fewest = 3
     for one in matrices:
-        if one.numbers is not None and one.is_floating and len(one.numbers) >= 3 and np.isfinite(one.numbers).all():
+        if one.numbers is not None and one.is_floating and len(one.numbers) >= fewest and np.isfinite(
+                one.numbers).all():
             yield one.numbers
         yield from _rows(one.inside)
 
@@ -128,7 +130,7 @@ def _elements(data: bytes, at: int, end: int, order: str) -> Iterator[tuple[int,
 
 
 def _matrices(data: bytes, at: int, end: int, order: str, depth: int = 0) -> Iterator[_Matrix]:
-    matrix, deepest = 14, 30
+    deepest = 30
     if depth > deepest:
         raise ValueError(f"more than {deepest} matrices inside each other")
     for kind, begin, stop in _elements(data, at, end, order):
@@ -138,13 +140,13 @@ def _matrices(data: bytes, at: int, end: int, order: str, depth: int = 0) -> Ite
             if engine.unconsumed_tail:
                 raise ValueError(f"a variable of more than {_MOST_BYTES} bytes")
             yield from _matrices(inside, 0, len(inside), order, depth=depth + 1)
-        elif kind == matrix and stop > begin:
+        elif kind == _MATRIX and stop > begin:
             yield _matrix(data, begin, stop, order, depth)
 
 
 def _matrix(data: bytes, begin: int, stop: int, order: str, depth: int) -> _Matrix:
     floating = (6, 7)  # classes of matrices: double and single
-    COMPLEX = 1 << 11
+    is_complex = 1 << 11  # of its flags
     parts = list(_elements(data, begin, stop, order))
     if not parts or parts[0][2] - parts[0][1] < 8:
         raise ValueError("a matrix without a class")
@@ -153,7 +155,7 @@ def _matrix(data: bytes, begin: int, stop: int, order: str, depth: int) -> _Matr
     if flags & 0xFF not in _NUMERIC:
         return _Matrix(name, None, False, tuple(_matrices(data, begin, stop, order, depth=depth + 1)))
     kind, first, last = parts[3] if len(parts) > 3 else (9, stop, stop)
-    if kind not in _NUMBERS or flags & COMPLEX:
+    if kind not in _NUMBERS or flags & is_complex:
         raise ValueError(f"numbers of a kind that there is not, {kind}, or complex ones")
     form = np.dtype(order + _NUMBERS[kind])
     with np.errstate(invalid="ignore"):  # of numbers that are none

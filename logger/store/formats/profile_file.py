@@ -459,8 +459,8 @@ def _even_spacing(distance: Array, steps: Array, file: str) -> float:
 def _rounding_m(spacing_m: float) -> float:
     # Distances printed with three decimals are up to half a millimetre off their grid; that much, and of short steps
     # 5 %, is taken for rounding.
-    rounding_m = 0.0006
-    return min(rounding_m, 0.05 * spacing_m)
+    rounding_m, rounding_steps = 0.0006, 0.05
+    return min(rounding_m, rounding_steps * spacing_m)
 
 
 def _pair(tracks: Sequence[Array]) -> tuple[Array, Array | None]:

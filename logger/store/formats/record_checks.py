@@ -262,13 +262,13 @@ def _rate_hz(t_s: Array) -> float:
 def unit_doubts(samples: Array, file: str, moving: Bools | None) -> list[Doubt]:
     """Doubts that samples (n, axes) are in m/s2. BadInput where they are in g, by the gravity in them, or all 0."""
     # A mean so near to 1 with so little about it is a record in g: 3 % is what sensors are off.
-    GRAVITY, gravity_near, gravity_calm = 1.0, 0.03, 0.35
+    gravity_g, gravity_near, gravity_calm = 1.0, 0.03, 0.35
     # R.m.s. about the mean: on a moving car it is more (0.15 on a new motorway, a tenth of it in g) and less.
     quiet_mps2, loud_mps2 = 0.1, 30.0
     counted = samples if moving is None or not moving.any() else samples[moving]
     mean, rms = counted.mean(axis=0), float(counted[:, 0].std())
     for gravity in (abs(float(mean[0])), float(np.hypot.reduce(mean))):
-        if abs(gravity - GRAVITY) < gravity_near and rms < gravity_calm:
+        if abs(gravity - gravity_g) < gravity_near and rms < gravity_calm:
             raise BadInput(f"{file}: expected accelerations in m/s2, found a mean of {gravity:.3f}, as gravity in g "
                            "has it: --unit g takes them as g, --unit mps2 as they are")
     if np.ptp(counted[:, 0]) == 0.0 or (moving is not None and not moving.any()):
@@ -375,4 +375,5 @@ def is_drive(path: Path | str) -> bool:
 
 def _is_name(name: str) -> bool:
     """Something that can be shown and typed, of bytes that are text."""
-    return 0 < len(name) <= 100 and name.isprintable() and "\ufffd" not in name
+    longest = 100
+    return 0 < len(name) <= longest and name.isprintable() and "\ufffd" not in name

@@ -432,8 +432,9 @@ def write_model(path: Path | str, model: CarModel, comments: str = "") -> None:
                  if read(model.given, name) != read(model.vehicle, name)}
         keys["given"] = moved | {name: _known_words(one) for name, one in model.known.items()}
     if model.history:
-        keys["history"] = [_OneLine(step=one.step, error=float(one.error), noise_floor_error=one.noise_floor_error
-                                    and float(one.noise_floor_error)) for one in model.history]
+        keys["history"] = [_OneLine(step=one.step, error=float(one.error), noise_floor_error=None
+                                    if one.noise_floor_error is None else float(one.noise_floor_error))
+                           for one in model.history]
     text = yaml.dump(keys, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=float("inf"))
     write_text(path, comments + text)
 
@@ -517,9 +518,10 @@ def fingerprint(vehicle: Vehicle, recorder_gain: Callable[[Array], Array] | None
 
     Not with the vehicle's name. The recorder's gain is given by its values at 0.01 to 100 Hz.
     """
+    digits = 6
     numbers = asdict(vehicle)
     del numbers["name"], numbers["preload_n"]  # a car has none
-    gain = recorder_gain(_GAIN_PROBES_HZ).round(6).tolist() if recorder_gain else None
+    gain = recorder_gain(_GAIN_PROBES_HZ).round(digits).tolist() if recorder_gain else None
     with_effects = {"effects": {one.effect.name: dict(one.values) for one in effects}} if effects else {}
     return json_sha256({"method": METHOD, "vehicle": numbers, "settings": asdict(settings), "recorder_gain": gain,
                         **with_effects})

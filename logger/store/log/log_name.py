@@ -153,9 +153,10 @@ def _store_counter(files: FileSystem, path: Path, number: int, warn: Warn) -> No
 
 def _read_counter(files: FileSystem, path: Path, warn: Warn) -> int:
     """The last number given out; 0 when the file is missing, damaged or cannot be read."""
+    most_bytes = 64
     try:
         with files.open(path) as file:
-            text, _, check = file.read(64).decode("ascii", "replace").strip().partition(" ")
+            text, _, check = file.read(most_bytes).decode("ascii", "replace").strip().partition(" ")
     except FileNotFoundError:
         return 0
     except OSError as error:

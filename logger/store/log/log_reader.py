@@ -184,8 +184,9 @@ def _follows(last: WindowRecord, record: WindowRecord) -> bool:
     if last.distance_end_m is None or record.distance_start_m is None or last.drive != record.drive:
         return False
     ground_m = apart_m(last, record)
-    near_m = 5 * max(length_m(last), length_m(record))
-    return abs(record.distance_start_m - last.distance_end_m) < 0.5 and ground_m is not None and ground_m < near_m
+    join_m, near_m = 0.5, 5 * max(length_m(last), length_m(record))
+    apart_along_m = abs(record.distance_start_m - last.distance_end_m)
+    return apart_along_m < join_m and ground_m is not None and ground_m < near_m
 
 
 def length_m(record: WindowRecord) -> float:

@@ -295,11 +295,12 @@ def tally_of(files: FileSystem, log: Path) -> Tally:
 
 def _lines(rows: Iterable[IntactRow], clock: ClockMap | None) -> Iterator[bytes]:
     """The text of a log with these rows, UTC filled in, in blocks."""
+    block_rows = 256
     lines = [HEADER]
     for row in rows:
         lines.append(as_now(row.text, row.record) if clock is None or row.record.utc_us is not None
                      else format_row(replace(without_utc(row.record), utc_us=row.record.t_us + clock.offset_us)))
-        if len(lines) >= 256:
+        if len(lines) >= block_rows:
             yield _joined(lines)
             lines.clear()
     yield _joined(lines)

@@ -289,7 +289,7 @@ F4_34 = Study("fig_4_34", "Discomfort of a bridge's step, per metre and per 10 m
 def _f4_36(effort: Workload) -> Result:
     heights_m = (0.0127, 0.0254, 0.0381, 0.0508, 0.0635)
     speeds_kmh = (16.1, 32.2, 48.3, 64.4, 80.5, 96.6)
-    LIMITS = (COMFORT_WORDS[-2], COMFORT_WORDS[-4])
+    comfort_limits = (COMFORT_WORDS[-2], COMFORT_WORDS[-4])
     speeds = np.array(effort.some(speeds_kmh, 3))
     # The car is linear: one height is enough for all.
     per_metre = np.array([_peak(STEP_M, kmh / 3.6) for kmh in effort.each(speeds.tolist())]) / STEP_M
@@ -305,15 +305,15 @@ def _f4_36(effort: Workload) -> Result:
                     Word.NOT_REPRODUCIBLE),
               Statement("least of the figure [m/s2]", "points below the green line, comfortable", float(peaks.min()),
                         0.0,
-                        LIMITS[0][0], Word.NOT_REPRODUCIBLE),
+                        comfort_limits[0][0], Word.NOT_REPRODUCIBLE),
               Statement("largest of the figure [m/s2]", "points above the red line, a noticeable discomfort",
-                        float(peaks.max()), LIMITS[1][0], word=Word.NOT_REPRODUCIBLE))
+                        float(peaks.max()), comfort_limits[1][0], word=Word.NOT_REPRODUCIBLE))
     verdict = ("In proportion to the height, as the car is linear; with the speed it rises steeply up to 32 km/h and "
                "slowly beyond, as a metre gets shorter than the blow. Where a metre begins moves its a_w by a tenth "
                "either way. The lines for comfort are those of Table 2.5 here, a little uncomfortable from 0.315 and "
                "uncomfortable from 0.8 m/s2, for the text does not say which ones were drawn.")
     lines = tuple(Line(f"{1000 * height:.1f} mm", speeds, row) for height, row in zip(heights_m, peaks, strict=True))
-    limits = tuple(Line(word.replace("_", " "), speeds, np.full(len(speeds), limit)) for limit, word in LIMITS)
+    limits = tuple(Line(word.replace("_", " "), speeds, np.full(len(speeds), limit)) for limit, word in comfort_limits)
     picture = Picture(Curves("Largest a_w of a metre over a step", "speed [km/h]", "a_w [m/s2]", (*lines, *limits)),
                       "dots for heights and speeds, and two lines across: comfortable below the green one, a "
                       "noticeable discomfort above the red one")

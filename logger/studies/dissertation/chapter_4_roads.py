@@ -106,7 +106,8 @@ def _t4_2(effort: Workload) -> Result:
     names, (bounce_hz, hop_hz) = ("body bounces", "body pitches", "wheels", "wheels"), printed_hz
     (rows,) = (quoted(structure_of(rav4()), names, (bounce_hz, None, hop_hz, None), (0.30, None, None, None))
                for _ in effort.each(range(1)))
-    by_eq = (1524.07 / 1.15 + 2 * 72.57) / 2
+    curb_kg, person_kg = 1524.07, 72.57
+    by_eq = (curb_kg / 1.15 + 2 * person_kg) / 2
     verdict = ("1.1 and 11 Hz are the undamped frequencies of bounce and wheels; the pitch, 1.45 Hz, is not named. The "
                "damping ratio of 0.30 is 0.29 with springs and tires in series, 0.28 on the springs alone, rounded. "
                f"The mass does not follow from the text: by Eq 4.36 half a car with two people has {by_eq:.0f} kg, not "

@@ -326,7 +326,7 @@ def _edge(start_m: float) -> Shape:
 
 
 def _manhole(start_m: float) -> Shape:
-    return lambda place_m: pothole(place_m, start_m, _UNIT_M, 0.60, 0.05)
+    return lambda place_m: pothole(place_m, start_m, _UNIT_M, length_m=0.60, edge_m=0.05)
 
 
 def _a_w_per_unit(shape: Shape, mph: int) -> float:

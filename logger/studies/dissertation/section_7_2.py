@@ -69,9 +69,9 @@ _SKIP = 200
 
 
 def _full_car(effort: Workload) -> Result:
-    SHARED = (1.0, 0.9, 0.5, 0.0)  # Share of the right track's mean square that it has from the left one.
-    LEFT_M = (0.0, 0.4)
-    cases = [(shared, left_m) for left_m in LEFT_M for shared in effort.some(SHARED)]
+    shares = (1.0, 0.9, 0.5, 0.0)  # Share of the right track's mean square that it has from the left one.
+    sides_m = (0.0, 0.4)
+    cases = [(shared, left_m) for left_m in sides_m for shared in effort.some(shares)]
     rows = tuple(_row_full_car(*case) for case in effort.each(cases))
     table = Table("A full car's record, explained by two models", (
         Column("sensor left of the middle [m]", ".1f"), Column("tracks share [% of power]", ".0f"),
@@ -239,7 +239,7 @@ class _Input:
 
 
 def _other_vehicles(effort: Workload) -> Result:
-    INPUTS = (
+    all_inputs = (
         *(_Input(f"bump, {1000 * height:.0f} mm", bump(_AT_M, height), 10)
           for height in (BUMP_HEIGHT_M / 2, BUMP_HEIGHT_M)),
         *(_Input(f"bridge, step of {1000 * height:.1f} mm", bridge(_AT_M, height), mph)
@@ -248,7 +248,7 @@ def _other_vehicles(effort: Workload) -> Result:
           for diameter in (TUBE_M, 3 * TUBE_M) for mph in (10, 40)),
     )
     cars = [read_vehicle(vehicle_file(name)) for name in effort.some(vehicle_names())]
-    inputs = effort.some(INPUTS)
+    inputs = effort.some(all_inputs)
     jobs: list[Vehicle | _Input] = [*cars, *inputs]
     rows = [_of_car(one) if isinstance(one, Vehicle) else _of_input(one) for one in effort.each(jobs)]
     vehicles = Table("The vehicles of config/vehicles (printed: one car)", (
@@ -327,17 +327,17 @@ OTHER_VEHICLES = Study("section_7_2_other_vehicles", "Other vehicles, other inpu
 
 def _sensor_position(effort: Workload) -> Result:
     speeds_mph = (10, 20, 30, 40, 50, 60, 70)
-    PLACES_M = (-1.0, -0.5, 0.0, 0.5, 1.0)
+    at_m = (-1.0, -0.5, 0.0, 0.5, 1.0)
     estimated_mph = 30
     speeds = np.array(speeds_mph) * MPH_MPS
-    felt = np.array([1 / rms_relation(known_vehicle(_at(place)), None, speeds).iri_per_accel_rms for place in PLACES_M])
-    change = 100 * (felt / felt[PLACES_M.index(0.0)] - 1)
+    felt = np.array([1 / rms_relation(known_vehicle(_at(place)), None, speeds).iri_per_accel_rms for place in at_m])
+    change = 100 * (felt / felt[at_m.index(0.0)] - 1)
     table = Table("R.m.s. acceleration by where the sensor sits, over that at the centre of gravity (printed: nothing)",
-                  (Column("speed [mph]", ".0f"), *(Column(f"{place:+g} m ahead [%]", "+.1f") for place in PLACES_M)),
+                  (Column("speed [mph]", ".0f"), *(Column(f"{place:+g} m ahead [%]", "+.1f") for place in at_m)),
                   tuple((float(mph), *map(float, row)) for mph, row in zip(speeds_mph, change.T, strict=True)))
     road = random_road(3.0, 230.0, 5)
     rows = []
-    for place in effort.each(effort.some(PLACES_M)):
+    for place in effort.each(effort.some(at_m)):
         drive = drive_over(road, estimated_mph * MPH_MPS, PS_2119, _at(place))
         unaware, aware = (per_window(drive, PS_2119, vehicle=car) for car in (rav4(), _at(place)))
         exact = aware.exact_m_per_km.mean()
@@ -356,7 +356,7 @@ def _sensor_position(effort: Workload) -> Result:
                "diagnose finds sensor_offset among the missing effects, and ridelog identify estimates sensor.ahead_m.")
     picture = Picture(Curves("What a sensor reads by its place", "speed [mph]", "change of the r.m.s. acceleration [%]",
                              tuple(Line(f"{place:+g} m ahead", np.array(speeds_mph, dtype=float), row)
-                                   for place, row in zip(PLACES_M, change, strict=True) if place),
+                                   for place, row in zip(at_m, change, strict=True) if place),
                              level=(0.0, "at the centre")), "nothing: future work")
     return Result((table, biases), verdict, (picture,), (
         Statement("least change of the r.m.s. a metre ahead or behind [%]", "a further look can demonstrate the effect "

@@ -42,11 +42,12 @@ _HALF_DIGIT = 0.0005
 
 
 def _five_modes(effort: Workload) -> Result:
-    printed_true_damping = 0.02
-    printed_hz = (0.889, 2.601, 4.096, 5.275, 6.031)
+    floor_kg, storey_n_per_m, printed_true_damping = 25.91, 10_000.0, 0.02
     # What its SSI-dat gives at order 16, the true frequencies being named by hand.
+    printed_hz = (0.889, 2.601, 4.096, 5.275, 6.031)
     printed_damping = (0.028, 0.018, 0.018, 0.024, 0.022)
-    building = with_damping_ratios(*chain(np.full(5, 25.91), np.full(5, 10_000.0)), np.full(5, printed_true_damping))
+    building = with_damping_ratios(*chain(np.full(5, floor_kg), np.full(5, storey_n_per_m)),
+                                   np.full(5, printed_true_damping))
     true_hz = np.sort(np.abs(building.poles()[0])) / (2 * np.pi)
     missed, extra, records, count = 0, 0, [], effort.count(5, 2)
     for seed in effort.each(range(count)):
@@ -89,9 +90,10 @@ def _five_modes(effort: Workload) -> Result:
 
 def _record(building: Masses, seed: int) -> Array:
     """Accelerations (samples, 5) under a white force on each floor, with a tenth of noise."""
+    length_s, noise_share = 300.0, 0.1
     rng = np.random.default_rng(seed)
-    clean = random_response(building, rng.standard_normal((4 * round(300.0 * _RATE_HZ), 5)), _RATE_HZ)
-    return np.asarray(clean + 10 ** (-20.0 / 20) * clean.std(axis=0) * rng.standard_normal(clean.shape))
+    clean = random_response(building, rng.standard_normal((4 * round(length_s * _RATE_HZ), 5)), _RATE_HZ)
+    return np.asarray(clean + noise_share * clean.std(axis=0) * rng.standard_normal(clean.shape))
 
 
 def _beside(name: str, printed: tuple[float, ...], true: tuple[float, ...], ours: Array, std: Array) -> list[Value]:
@@ -116,7 +118,8 @@ def _mass_from_a_bump(effort: Workload) -> Result:
              ("jax-sysid 1.1, own state equation", -0.07, None),
              ("SIPPY, nfoursid, Octave, python-control", None, None))
     scatter = 0.07  # Standard error of the mass by the record alone [%]: what any unbiased fit scatters by at least.
-    fits = [fitted(record_of(bump(8.0), BUMP_MPS, 6.0, Conditions(seed=seed)), {MASS: 800.0}, ours=True)
+    at_m, lasts_s, start_kg = 8.0, 6.0, 800.0
+    fits = [fitted(record_of(bump(at_m), BUMP_MPS, lasts_s, Conditions(seed=seed)), {MASS: start_kg}, ours=True)
             for seed in effort.each(range(effort.count(40, 5)))]
     errors = np.array([error_percent(one, MASS) for one in fits])
     given = np.array([standard_error_percent(one, MASS) for one in fits])

@@ -61,9 +61,8 @@ IRI_CHECK_PROFILE = Study(
 
 
 def _golden_car_gain(effort: Workload) -> Result:
-    printed_peaks_cpm = (0.065, 0.42)
     # Peaks, and where the response is down to 0.5; wavelengths of about 15, 2.4, 30 and 1.25 m.
-    printed_halves_cpm = (0.033, 0.8)
+    printed_peaks_cpm, printed_halves_cpm = (0.065, 0.42), (0.033, 0.8)
     share = 0.05  # Of the printed value, as broad humps are read off a figure.
     wave_number = np.geomspace(0.01, 3.0, effort.count(4000, 1000))
     gain = slope_gain(wave_number, 0.0)
@@ -160,10 +159,10 @@ def saw_teeth(teeth: float) -> np.ndarray:
 
 
 def _iso_8041_bursts(effort: Workload) -> Result:
-    TEETH = (1, 2, 4, 8, 16, inf)
+    teeth_counts = (1, 2, 4, 8, 16, inf)
     rows, values = [], []
     found: dict[str, list[float]] = {"wk": [], "wd": []}
-    for number, teeth in enumerate(effort.each(TEETH)):
+    for number, teeth in enumerate(effort.each(teeth_counts)):
         wave = saw_teeth(teeth)
         words = "continuous" if teeth == inf else f"{teeth:g} in 10 s"
         for name, weighting in (("wk", WK), ("wd", WD)):
@@ -177,7 +176,7 @@ def _iso_8041_bursts(effort: Workload) -> Result:
     worst = {name: max(abs(row[4]) for row in rows if row[1] == name) for name in found}
     verdict = (f"Wk agrees within {worst['wk']:.2%}, Wd within {worst['wd']:.2%}. The weighting is the formula of the "
                "standard itself on the whole record; a plain bilinear transform at 100 Hz is off by more above 8 Hz.")
-    at = np.array(TEETH[:-1], dtype=float)
+    at = np.array(teeth_counts[:-1], dtype=float)
     lines = [Line(f"{name}, {who}", at, np.array(one[:-1]), dots=who == "printed") for name in found
              for who, one in (("ours", found[name]), ("printed", PRINTED_MPS2[name]))]
     picture = Picture(Curves("Weighted r.m.s. of bursts by their teeth", "teeth in 10 s", "weighted r.m.s. [m/s2]",

@@ -50,8 +50,8 @@ def test_a_promise_is_what_dense_least_squares_gain_by_the_change(slight: Baseli
     after, there = dense.least(dense.residual, dense.here, dense.white(trial.change))
     assert trial.start is None and found.gain == trial.gain
     best = before - after
-    strength = there[-1]
-    if 0.03 <= strength <= 10:
+    strength, weakest = there[-1], -10 if EFFECTS[name].parameters[0].low < 0 else 0.03
+    if weakest <= strength <= 10:
         assert trial.gain == pytest.approx(best, rel=1e-6, abs=1e-4)
         assert trial.logs == pytest.approx(there[: dense.count], abs=1e-6)
     else:  # not as strong, or as weak, as would be best
