@@ -404,7 +404,7 @@ class Search(Generic[M, P, F]):
                          least: float) -> list[F]:
         """Rough fits of screened effects, each on its model, from all their trials that gain more than this."""
         fits = pool.map(lambda pair: self.likelihood.fitted_roughly(
-            score, *pair, least if pair[1].effect.reshapes else 0.0), worth)
+            score, pair[0], pair[1], least if pair[1].effect.reshapes else 0.0), worth)
         return [one for some in fits for one in some]
 
     def _reached(self, now: M, fits: Sequence[F]) -> float:
