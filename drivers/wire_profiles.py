@@ -179,10 +179,10 @@ def _profile(top: Node) -> WireProfile:
 
 
 def _items(node: Node, count: int) -> tuple[Node, ...]:
-    """The nodes of a list of so many numbers."""
+    """The nodes of a list of so many numbers, each under the key of the list."""
     if len(node.items()) != count:
         raise node.wrong(f"a list of {count} numbers")
-    return node.items()
+    return tuple(replace(one, key=node.key) for one in node.items())
 
 
 def _frame_layout(node: Node) -> FrameLayout:

@@ -18,6 +18,7 @@ from typing import Any, ClassVar, Generic, Protocol, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from drivers.catalogue import CatalogueError
 from drivers.hardware import Machine
 from drivers.readings import AccelerationBlock, Kind, RecordedWords
 from drivers.sources import SerialSource, Source, serial_advice
@@ -109,7 +110,9 @@ class Accelerometer(ABC, Generic[Settings]):
 
     @property
     def keys(self) -> Mapping[str, Kind]:
-        """What may stand at each of its settings in a settings file."""
+        """What may stand at each of its settings in a settings file. CatalogueError for one that does not say it."""
+        if bare := [one.name for one in fields(self.settings) if "kind" not in one.metadata]:  # type: ignore[arg-type]
+            raise CatalogueError(f"{self.name}: expected each of its settings to be made by setting, found {bare[0]}")
         return {one.name: one.metadata["kind"] for one in fields(self.settings)}  # type: ignore[arg-type]
 
     def check_chosen(self, settings: Settings) -> None:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import errno
+from dataclasses import make_dataclass
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from drivers.accelerometers.adxl345 import ACCELEROMETER, Adxl345, Adxl345Config, Adxl345Decoder
+from drivers.catalogue import CatalogueError
 from drivers.errors import BadReply, DeviceError, NotPresent, SettingsError, SettingsLost, WrongDevice
 from drivers.readings import AccelerationBlock, Event
 from drivers.sources import ChipSource, Deadlines, Source
@@ -180,3 +182,10 @@ def test_an_answer_that_cannot_be_is_refused(data: bytes) -> None:
 def test_rates_that_the_chip_does_not_have_are_refused() -> None:
     with pytest.raises(SettingsError, match="rate_hz is one of 200, 400, 800, not 300"):
         Adxl345Config(rate_hz=300)
+
+
+def test_a_setting_that_does_not_say_what_may_stand_there_is_refused() -> None:
+    bare = make_dataclass("Bare", [("rate_hz", int, 200)], frozen=True)
+    kind = type("Mine", (type(ACCELEROMETER),), {"name": "mine", "settings": bare})()
+    with pytest.raises(CatalogueError, match="mine: expected .* made by setting, found rate_hz"):
+        _ = kind.keys
