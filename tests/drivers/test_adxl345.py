@@ -187,5 +187,5 @@ def test_rates_that_the_chip_does_not_have_are_refused() -> None:
 def test_a_setting_that_does_not_say_what_may_stand_there_is_refused() -> None:
     bare = make_dataclass("Bare", [("rate_hz", int, 200)], frozen=True)
     kind = type("Mine", (type(ACCELEROMETER),), {"name": "mine", "settings": bare})()
-    with pytest.raises(CatalogueError, match="mine: expected .* made by setting, found rate_hz"):
+    with pytest.raises(CatalogueError, match=r"mine: expected .* made by setting, found rate_hz"):
         _ = kind.keys
