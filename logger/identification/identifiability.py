@@ -90,10 +90,12 @@ def structural(names: Sequence[str], derivatives: Array, size: float, nothing: f
 def statistical(names: Sequence[str], covariance: Array, weakest: Array | None = None) -> list[Finding]:
     """What the noise leaves too uncertain: covariance (p, p) of the relative changes.
 
-    weakest    (p,) the largest deviation of each that is still an estimate; None: ``WEAKEST``
+    weakest    (p,) the largest deviation of each that is still an estimate, infinite where any is; None: ``WEAKEST``
     """
-    deviations = np.sqrt(np.diag(covariance))
     limits = np.full(len(names), WEAKEST) if weakest is None else weakest
+    asked = np.isfinite(limits)
+    names, limits, covariance = np.array(names)[asked].tolist(), limits[asked], covariance[np.ix_(asked, asked)]
+    deviations = np.sqrt(np.diag(covariance))
     weak = deviations > limits
     if not weak.any():
         return []
@@ -104,7 +106,7 @@ def statistical(names: Sequence[str], covariance: Array, weakest: Array | None =
         if power <= 1 or not weak.any():
             break
         shares = _shares(names, direction * limits, direction * limits * traces)
-        errors = {name: f"{deviations[list(names).index(name)]:.0%}" for name in shares}
+        errors = {name: f"{deviations[names.index(name)]:.0%}" for name in shares}
         if len(shares) == 1:
             (name, error), = errors.items()
             words = (f"this drive says nothing about {name}: its standard error would be {error} of it. Hold it fixed, "

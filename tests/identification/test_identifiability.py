@@ -96,3 +96,10 @@ def test_weakness_is_read_off_the_covariance() -> None:
     assert "nearly share one scale" in found.words
     found, = statistical(["a", "b"], both * [[1, -1], [-1, 1]])
     assert "a by +1.0% and b by -1.0%" in found.words or "a by -1.0% and b by +1.0%" in found.words
+
+
+def test_of_what_was_known_before_any_error_is_an_estimate() -> None:
+    apart = np.array([[1.0, 0.9, 0.0], [0.9, 1.0, 0.0], [0.0, 0.0, 0.01]])
+    found, = statistical(["a", "b", "c"], apart, np.array([0.5, np.inf, 0.5]))
+    assert found.direction == {"a": 1.0}
+    assert not statistical(["a", "b", "c"], apart, np.array([2.0, np.inf, np.inf]))
