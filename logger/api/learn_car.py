@@ -107,7 +107,6 @@ class LearnedVehicle(CommandResult):
     iri_std            what is left unknown of an IRI by speed, as a share; ``iri_std_before`` of any car of this
                        wheelbase
     """
-
     model: CarModel
     parameters: Mapping[str, float]
     standard_errors: Mapping[str, float]
@@ -171,7 +170,6 @@ def _read_run(path: Path) -> Drive:
 
 def spectra_of(drive: Drive) -> DriveSpectra:
     """The blocks of a drive, with what is known of its sensor."""
-
     facts = drive.facts
     known = [one for one in (facts.noise_mps2, facts.step_mps2 and facts.step_mps2 / 12**0.5) if one]
     noise = 2 * sum(one**2 for one in known) / drive.rate_hz if known else np.nan
@@ -186,7 +184,6 @@ def spectra_of(drive: Drive) -> DriveSpectra:
 @dataclass(frozen=True, eq=False)
 class _Used:
     """A drive that has blocks."""
-
     name: str
     seconds: float
     spectra: DriveSpectra
@@ -256,7 +253,6 @@ def _used(question: LearnCarQuestion) -> list[_Used]:
 
 def learned(question: LearnCarQuestion) -> LearnedVehicle:
     """The answer to ``LearnCarQuestion``, which says what is raised."""
-
     used = _used(question)
     knowledge = CarKnowledge(question.wheelbase_m, ahead_m=question.sensor,
                              ahead_std_m=_USUAL_STD_M if question.sensor is None else _GIVEN_STD_M)
@@ -294,7 +290,6 @@ def _most_apart(one: LearnedCar, other: LearnedCar, names: Sequence[str]) -> str
 
 def _check_wheelbase(problem: UnknownCar, car: LearnedCar) -> None:
     """CheckFailed where the interference between the axles is that of another wheelbase."""
-
     at = COORDINATES.index("wheelbase_m")
     free = UnknownCar(problem.spectra, replace(problem.knowledge, wheelbase_std=0.2))
     found = free.fit_of([car.x, *(_moved(car.x, at, step) for step in (-0.1, 0.1))])
@@ -377,7 +372,6 @@ def _with_unit(number: str) -> str:
 def _check_car(problem: UnknownCar, car: LearnedCar) -> None:
     """CheckFailed where the numbers together are as far from those of published cars as no car's; a worn damper is no
     reason."""
-
     off = (car.x - problem.knowledge.mean) / problem.knowledge.std
     kept = [at for at, name in enumerate(NUMBERS) if off[at] > -2 or not name.endswith("damping_ratio")]
     far = (car.x - problem.knowledge.mean)[kept]
@@ -428,7 +422,6 @@ def _answer(question: LearnCarQuestion, used: Sequence[_Used], problem: UnknownC
 
 def _unseen_errors(knowledge: CarKnowledge, unseen: Sequence[tuple[DriveSpectra, LearnedCar]]) -> dict[str, Any]:
     """How far drives are from any car of this wheelbase, and from the one that was learnt from the others."""
-
     found = [[misfit(UnknownCar(spectra, knowledge), x) for x in (knowledge.mean, rest.x)] for spectra, rest in unseen]
     before, after = np.sqrt(np.mean(np.square(found), axis=0)).tolist() if found else (None, None)
     return {"drives": len(found), "misfit_before": before, "misfit_after": after}
@@ -445,7 +438,6 @@ def _slope(name: str, value: float) -> float:
 
 def _sprung_side_kg(mass_kg: float, x: Array) -> float:
     """Sprung mass of one side of a car that weighs so much with its wheels."""
-
     share = _shown("rear_share", float(x[NUMBERS.index("rear_share")]))
     ratios = [float(np.exp(x[NUMBERS.index(f"{end}.unsprung_to_sprung")])) for end in ("front", "rear")]
     return mass_kg / 2 / (1 + ratios[0] * (1 - share) + ratios[1] * share)
@@ -453,7 +445,6 @@ def _sprung_side_kg(mass_kg: float, x: Array) -> float:
 
 def _number_errors(knowledge: CarKnowledge, car: LearnedCar, mass: float) -> Any:
     """Errors of the numbers of the vehicle's file, that of the common scale left out."""
-
     vehicle = knowledge.car(car.x, mass, "")
     names = [one for one in sized(vehicle) if one != "sprung_mass_kg"]
     if vehicle.sensor.ahead_m:
@@ -526,7 +517,6 @@ def _warnings(problem: UnknownCar, car: LearnedCar, values: Mapping[str, float],
 
 def _not_identifiable(problem: UnknownCar, car: LearnedCar) -> Iterator[str]:
     """What the drives cannot tell, a line each."""
-
     low, high = np.quantile(problem.spectra.speed_mps, (0.05, 0.95))
     if high < _ONE_SPEED * low:
         yield (f"All drives at one speed ({3.6 * low:.0f} to {3.6 * high:.0f} km/h): springs and the road's waviness "
@@ -542,7 +532,6 @@ def _not_identifiable(problem: UnknownCar, car: LearnedCar) -> Iterator[str]:
 
 def _changes(question: LearnCarQuestion, car: LearnedCar) -> Iterator[str]:
     """What has changed since another file was learnt."""
-
     assert question.compare is not None
     before = read_vehicle(question.compare)
     try:
@@ -564,7 +553,6 @@ def _misfits(used: Sequence[_Used], knowledge: CarKnowledge, car: LearnedCar, sp
              level: float) -> Iterator[str]:
     """Vehicles that the settings of the drives named and that are not this car: their IRI is off by more than this
     car's error lets it be."""
-
     said = {one.vehicle for one in used if one.vehicle in vehicle_names()} - {GENERIC}
     if not said:
         return
@@ -588,7 +576,6 @@ def _misfits(used: Sequence[_Used], knowledge: CarKnowledge, car: LearnedCar, sp
 
 def _coordinate_errors(model: CarModel) -> Array:
     """Standard errors of a model's coordinates, out of those of its numbers; 0 where it says none."""
-
     if model.errors is None:
         return np.zeros(len(NUMBERS))
     names = [name for name in model.errors.standard_errors if not name.startswith("sensor.")]
@@ -605,7 +592,6 @@ def _coordinate_errors(model: CarModel) -> Array:
 
 def _charts(problem: UnknownCar, car: LearnedCar) -> Iterator[Chart]:
     """Measured and expected spectra of thirds of the speeds."""
-
     f_hz, speeds = middles_hz(), problem.spectra.speed_mps
     edges = np.quantile(speeds, (0.0, 1 / 3, 2 / 3, 1.0))
     start = problem.knowledge.mean

@@ -312,8 +312,9 @@ def _t6_5(effort: Workload) -> Result:
     limits = tuple(Line(word.replace("_", " "), depths, np.full(2, limit))
                    for limit, word in COMFORT_WORDS if 0 < limit < 2.0)
     values = tuple(Statement(f"location {number}: {what}, {end}", f"{word.replace('_', ' ')}: {reason}",
-                             float(str(row[place])), least, most, Word.NOT_REPRODUCIBLE) for (number, _, word, reason),
-                   what, row, (least, most, end, place) in zip(PRINTED, sizes, rows, to_be_found, strict=True))
+                             float(str(row[place])), least, most, Word.NOT_REPRODUCIBLE)
+                   for (number, _, word, reason), what, row, (least, most, end, place) in zip(
+                       PRINTED, sizes, rows, to_be_found, strict=True))
     picture = Picture(Curves("a_w of the worst window by size", "height of the step, depth of the manhole [mm]",
                              "a_w [m/s2]", (Line("step, 25 mph", depths, factors[0] * depths),
                                             Line("manhole, 20 mph", depths, factors[1] * depths), *limits)),
