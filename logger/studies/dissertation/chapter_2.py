@@ -61,8 +61,8 @@ _SPACING_M_T2_2 = 0.05
 def _t2_2(effort: Workload) -> Result:
     # Class, lower limit, geometric mean, upper limit [cm3].
     printed = (("A", None, 16, 32), ("B", 32, 64, 128), ("C", 128, 256, 512), ("D", 512, 1_024, 2_048),
-          ("E", 2_048, 4_096, 8_192), ("F", 8_192, 16_384, 32_768), ("G", 32_768, 65_536, 131_072),
-          ("H", 131_072, 262_144, None))
+               ("E", 2_048, 4_096, 8_192), ("F", 8_192, 16_384, 32_768), ("G", 32_768, 65_536, 131_072),
+               ("H", 131_072, 262_144, None))
     printed_power = 1.0  # of a metre, in m2 (cycle/m)
     limits = [_limit(*pair) for pair in pairwise(CLASS_GD_N0_CM3.items())]
     roads = effort.count(20, 2)
@@ -278,7 +278,7 @@ T2_7 = Study("table_2_7", "Parameters of the six frequency weightings", "Table 2
 def _f2_13(effort: Workload) -> Result:
     printed_peaks_cpm = (0.065, 0.42)
     printed_peaks_hz = (1.44, 9.33)
-    NEAR = 0.05  # as near as the top of a broad hump is read off a figure
+    near_share = 0.05  # as near as the top of a broad hump is read off a figure
     wave_number = np.geomspace(0.01, 2.0, effort.count(2000, 200))
     gain = slope_gain(wave_number, 0.0)
     slow = wave_number < 0.2
@@ -297,9 +297,9 @@ def _f2_13(effort: Workload) -> Result:
     picture = Picture(Curves("Gain of the IRI's car at 80 km/h, slope of the suspension per slope of the road",
                              "wave number [cycle/m]", "gain", (Line("gain", wave_number, gain),), log_x=True),
                       "the IRI of sine waves of 0.1 to 100 m, largest at two wave numbers, 0.065 and 0.42 cycle/m")
-    values = (*(Value(f"{words} peak [cycle/m]", printed, float(wave_number[peak]), NEAR * printed)
+    values = (*(Value(f"{words} peak [cycle/m]", printed, float(wave_number[peak]), near_share * printed)
                 for words, printed, peak in zip(("first", "second"), printed_peaks_cpm, peaks, strict=True)),
-              *(Value(f"where the {words} [cycle/m]", printed, near, NEAR * printed, Word.MISPRINT)
+              *(Value(f"where the {words} [cycle/m]", printed, near, near_share * printed, Word.MISPRINT)
                 for words, printed, near in zip(("wheel hops", "body bounces"), printed_peaks_cpm, nearest,
                                                 strict=True)),
               *(Value(f"{printed:g} cycle/m at 80 km/h [Hz]", hz, printed * STANDARD_SPEED_MPS, 0.005, of_print=True)
@@ -326,9 +326,10 @@ def _f2_18(effort: Workload) -> Result:
     at_hz = 1.0
     additional_hz = (0.5, 4.0, 20.0)
     same = 1e-6  # of the factor: the formulas are the same but for how they are written
+    last_digit = 0.001
     principal = about("Fig 2.18", [
         Value(f"{weighting.name} at {f_hz:g} Hz (ISO 2631-1)", factor, float(abs(weighting.response(f_hz))),
-              0.75 * 0.001) for weighting, factors in standard for f_hz, factor in factors])
+              0.75 * last_digit) for weighting, factors in standard for f_hz, factor in factors])
     additional = about("Fig 2.19", [
         Value(f"{weighting.name} at {f_hz:g} Hz (Eq 2.13 to 2.15)", by_eq, ours, same * by_eq)
         for weighting, parameters in PRINTED_T2_7 if weighting.name in ADDITIONAL for f_hz in additional_hz
@@ -388,9 +389,9 @@ F2_18 = Study("fig_2_18", "Curves of the six frequency weightings", "Fig 2.18, s
 
 def _f2_20(effort: Workload) -> Result:
     printed_shaded_hours = (4.0, 8.0)
-    HOURS = (1 / 60, 1 / 6, 0.5, 1.0, 2.0, 4.0, 6.0, 8.0, 24.0)
+    hours_shown = (1 / 60, 1 / 6, 0.5, 1.0, 2.0, 4.0, 6.0, 8.0, 24.0)
     dose_per_rms = 1.4  # the estimated dose of ISO 2631-1, Eq B.3
-    zones = [(hours, caution_zone(hours, 2), caution_zone(hours, 4)) for hours in effort.each(HOURS)]
+    zones = [(hours, caution_zone(hours, 2), caution_zone(hours, 4)) for hours in effort.each(hours_shown)]
     table = Table("The zone, weighted r.m.s.", (
         Column("hours a day", ".3g"), Column("n = 2, from [m/s2]", ".3f"), Column("to [m/s2]", ".3f"),
         Column("n = 4, from [m/s2]", ".3f"), Column("to [m/s2]", ".3f"), Column("printed")), tuple(

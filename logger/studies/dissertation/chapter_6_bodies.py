@@ -77,10 +77,10 @@ _OFF = 0.05
 def _t6_1(effort: Workload) -> Result:
     # Share by which a speedometer may be off at 16.1 km/h: a tenth and 4 km/h (UNECE Regulation 39, 5.4).
     speedometer = (0.1 * 16.1 + 4) / 16.1
-    IRI = 3.0
+    road_iri = 3.0
     drives = effort.count(40)
     factors = np.random.default_rng(1).normal(1.0, _OFF, (drives, 3)).tolist()
-    jobs = [*(case[1:] for case in CASES_T6_1), *((height, width, speed, IRI) for height, width, speed in factors)]
+    jobs = [*(case[1:] for case in CASES_T6_1), *((height, width, speed, road_iri) for height, width, speed in factors)]
     found = [_both_ways(*job, seed=seed) for seed, job in enumerate(effort.each(jobs))]
     cases, draws = found[:len(CASES_T6_1)], np.array(found[len(CASES_T6_1):])
     printed = Table("Printed", (Column("bump", ".0f"), *(Column(f"trial {trial}, {what}", form) for trial in (1, 2)
@@ -98,7 +98,7 @@ def _t6_1(effort: Workload) -> Result:
         ("ours, the same drives",
          _rms_t6_1(ours), float(np.abs(ours).max()),
          float(100 * (np.abs(ours) < 2 * expected).mean())))
-    many = Table(f"Height, width and speed each off by chance, 5 % r.m.s., on roads of IRI {IRI:g} m/km", (
+    many = Table(f"Height, width and speed each off by chance, 5 % r.m.s., on roads of IRI {road_iri:g} m/km", (
         Column("way"), Column("r.m.s. error [%]", ".1f"), Column("largest [%]", ".1f"),
         Column("truth within two standard errors [%]", ".0f")), rows)
     by_trial = {f"Table 6.{trial}": _rms_t6_1(np.array(PRINTED_PERCENT)[:, trial - 1]) for trial in (1, 2)}
@@ -173,9 +173,9 @@ REFUSED = "cannot tell"
 
 def _t6_3(effort: Workload) -> Result:
     # True step [m] and the road's IRI [m/km].
-    CASES = tuple((step_m, iri) for step_m in (STEP_M, 0.0127) for iri in (0.0, 2.0, 5.0))
+    all_cases = tuple((step_m, iri) for step_m in (STEP_M, 0.0127) for iri in (0.0, 2.0, 5.0))
     chance = 0.58  # twice the standard error of an r.m.s. of six, as a share of it
-    cases, roads = effort.some(CASES), effort.count(6)
+    cases, roads = effort.some(all_cases), effort.count(6)
     jobs = [(step_m, iri, seed) for step_m, iri in cases for seed in range(roads)]
     drives = [_drive(*job) for job in effort.each(jobs)]
     rows = tuple(_row_t6_3(*case, drives[number * roads:(number + 1) * roads]) for number, case in enumerate(cases))
@@ -281,8 +281,8 @@ _LIMIT = {word: limit for limit, word in COMFORT_WORDS}
 
 
 def _t6_5(effort: Workload) -> Result:
-    PRINTED = ((1, 5, "a_little_uncomfortable", "intersection of new and old pavement"),
-          (2, 6, "fairly_uncomfortable", "manhole"), (3, 23, "uncomfortable", "damaged pavement"))
+    printed_rows = ((1, 5, "a_little_uncomfortable", "intersection of new and old pavement"),
+                    (2, 6, "fairly_uncomfortable", "manhole"), (3, 23, "uncomfortable", "damaged pavement"))
     # Sizes that the source names: steps from where a bridge needs maintenance to where many have one (4.4.5) [mm],
     # depressions of Table 2.4 [mm], damaged pavements to the roughest of Table 2.3 [m/km]; and the end of our range,
     # with its column, that lies nearest to not being found.
@@ -290,13 +290,13 @@ def _t6_5(effort: Workload) -> Result:
     starts_m = tuple(np.arange(50.0, 57.6, 1.0).tolist())
     starts = effort.some(starts_m)
     per_mm = [np.mean([_a_w_per_unit(shape(start), PRINTED_MPH[segment]) for start in starts]) / (1000 * _UNIT_M)
-              for shape, (_, segment, *_) in zip((_edge, _manhole), effort.each(PRINTED[:2]), strict=True)]
-    speed = (PRINTED_MPH[PRINTED[2][1]] * MPH_MPS,)
+              for shape, (_, segment, *_) in zip((_edge, _manhole), effort.each(printed_rows[:2]), strict=True)]
+    speed = (PRINTED_MPH[printed_rows[2][1]] * MPH_MPS,)
     (line,) = calibrate(known_vehicle(rav4()), None, CalibrationSettings(speed, roads=effort.count(40, 5)))
     factors = (*map(float, per_mm), line.a_w_per_iri.slope)
     sizes = ("height of a step [mm]", "depth of a dip of 0.6 m [mm]", "IRI over the window [m/km]")
     rows = tuple(_row_t6_5(printed, what, factor)
-                 for printed, what, factor in zip(PRINTED, sizes, factors, strict=True))
+                 for printed, what, factor in zip(printed_rows, sizes, factors, strict=True))
     table = Table("What has to lie there for the printed word", (
         Column("location", ".0f"), Column("segment", ".0f"), Column("printed perception"), Column("printed reason"),
         Column("speed [mph]", ".0f"), Column("size that is asked for"), Column("a_w per unit of it [m/s2]", ".4f"),
@@ -314,7 +314,7 @@ def _t6_5(effort: Workload) -> Result:
     values = tuple(Statement(f"location {number}: {what}, {end}", f"{word.replace('_', ' ')}: {reason}",
                              float(str(row[place])), least, most, Word.NOT_REPRODUCIBLE)
                    for (number, _, word, reason), what, row, (least, most, end, place) in zip(
-                       PRINTED, sizes, rows, to_be_found, strict=True))
+                       printed_rows, sizes, rows, to_be_found, strict=True))
     picture = Picture(Curves("a_w of the worst window by size", "height of the step, depth of the manhole [mm]",
                              "a_w [m/s2]", (Line("step, 25 mph", depths, factors[0] * depths),
                                             Line("manhole, 20 mph", depths, factors[1] * depths), *limits)),

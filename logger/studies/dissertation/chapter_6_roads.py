@@ -418,10 +418,10 @@ def _f6_23(effort: Workload) -> Result:
 def _biases_percent(mph: int, segments: Sequence[int], effort: Workload) -> Array:
     """Errors of the windows' mean by the r.m.s. relation on further roads of the segments of a speed (n,) [%]."""
     # further roads of each segment, and of all slow ones together; then the r.m.s. relation alone
-    ROADS, fewest = 4, 24
+    roads_each, fewest = 4, 24
     edges_m: Array = WINDOW_M * np.arange(_WINDOWS + 1.0)
     slow = PRINTED_KMH[mph] < PRINTED_SLOW_KMH
-    roads = max(2, effort.count(ROADS * len(segments)), fewest * slow * (len(segments) > 1))
+    roads = max(2, effort.count(roads_each * len(segments)), fewest * slow * (len(segments) > 1))
     found = []
     for number in range(roads):
         segment, draw = segments[number % len(segments)], 1 + number // len(segments)
