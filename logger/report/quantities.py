@@ -59,8 +59,9 @@ def numbers_of(one: Chosen) -> str:
     usual = {parameter.name: parameter.default for parameter in one.effect.parameters if parameter.given}
     inside = {parameter.name for parameter in one.effect.parameters
               if parameter.is_free and not parameter.at_bound(one.values[parameter.name])}
-    return ", ".join(f"{name} {_with_unit(value, one.standard_errors.get(name), name, name in inside)}"
-                     for name, value in one.values.items() if usual.get(name) != value)
+    said = [f"{name} {_with_unit(value, one.standard_errors.get(name), name, name in inside)}"
+            for name, value in one.values.items() if usual.get(name) != value and name != "axle"]
+    return ", ".join([one.where] * bool(one.where) + said)
 
 
 def _with_unit(value: float, error: float | None, name: str, inside: bool) -> str:

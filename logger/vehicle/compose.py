@@ -176,7 +176,7 @@ def compose(vehicle: Vehicle, effects: Sequence[Chosen] = ()) -> Car:
         if vehicle.preload_n:
             corner = corner.with_spring(partial(_preload, vehicle.preload_n))
         for effect, p in forces:
-            corner = effect.laws(p, corner)
+            corner = effect.laws_at_its_axle(p, corner)
         laws.append(corner)
     row = body_point(structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m).row
     around = (SensorEffect, DriveEffect, RecordEffect)

@@ -145,6 +145,11 @@ class Parameter:
         return abs(self.coordinate(value) - lowest) < _AT_BOUND * self.usual_range(origin=lowest)
 
 
+AXLE = Parameter("axle", 0.0, 0.0, 2.0, None, Scale.LINEAR, (0.0,), "where it acts: 1 at the front, 2 at the rear, "
+                 "0 at both", choices=(0.0, 1.0, 2.0), default=0.0, given=True)
+"""Of an effect of suspensions, which may sit in those of one axle alone. A search tries both, and then each."""
+
+
 @dataclass(frozen=True)
 class Misalignment:
     """How position and acceleration of some runs seem to lie against each other.
@@ -324,12 +329,16 @@ class BodyEffect(Effect):
 
 
 class ForceEffect(Effect):
-    """A law of springs, dampers and tires: the same at every wheel, unless it asks which axle it is at (``laws.rear``).
-    """
+    """A law of springs, dampers and tires: the same at every wheel, unless it asks which axle it is at (``laws.rear``) or
+    has ``AXLE`` among its parameters."""
 
     @abstractmethod
     def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
         """The laws of a corner with it."""
+
+    def laws_at_its_axle(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+        """The same, where it may sit in one axle alone."""
+        return self.laws(p, laws) if getattr(p, AXLE.name, 0) in (0, 1 + laws.rear) else laws
 
 
 class SensorEffect(Effect):
@@ -391,6 +400,11 @@ class Chosen:
             return True
         shapes = [one for one in numbers if one.null is None and one.scale is Scale.LOG]
         return len(shapes) < len(numbers) and any(one.at_bound(self.values[one.name]) for one in shapes)
+
+    @property
+    def where(self) -> str:
+        """In words the one axle that it acts at; empty: at all that there are."""
+        return ("", "front axle alone", "rear axle alone")[int(self.values.get(AXLE.name, 0))]
 
     def is_shaped_as(self, other: Chosen) -> bool:
         """Whether another is the same effect with the same frequencies, knees and choices, whatever its strength."""

@@ -69,7 +69,7 @@ def test_an_effect_without_numbers_is_reported_in_words() -> None:
 
 def test_a_number_at_its_bound_was_not_measured() -> None:
     asymmetry = EFFECTS["damper_asymmetry"]
-    (ratio,) = asymmetry.parameters
+    ratio = asymmetry.parameters[0]
     bound = replace(FOUND, effects=(chosen(asymmetry, {ratio.name: ratio.high}),), names=("damper_asymmetry",))
     assert judgement(bound)[1] == (f"At its bound: {ratio.name}. The bound stopped the fit there; it is not a "
                                    "measured value.")

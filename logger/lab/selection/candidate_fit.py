@@ -16,7 +16,7 @@ from logger.lab.likelihood.posterior import NotSimulated, State
 from logger.lab.selection.evidence import min_gain, probability_by_chance, probability_of_likelihood_gain
 from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.lab.selection.screening import Baseline, Screened, Trial
-from logger.vehicle.effect import Chosen, Effect
+from logger.vehicle.effect import AXLE, Chosen, Effect
 from logger.vehicle.named_parameters import free_parameters_of
 
 
@@ -61,13 +61,16 @@ def chance_of(effects: Sequence[Chosen], gain: float, freedom: float, candidates
     if any(one.effect.realigns for one in effects):
         return bound
     numbers = len(free_parameters_of(effects))
-    trials = candidates * prod(_shapes(one.effect) for one in effects)
+    trials = candidates * prod(_shapes(one) for one in effects)
     return min(bound, probability_of_likelihood_gain(gain + numbers * float(np.log(freedom)), numbers, trials))
 
 
-def _shapes(effect: Effect) -> int:
-    """From how many shapes, such as frequencies or knees, a search for an effect starts."""
-    return len({tuple(values[one.name] for one in effect.parameters if one.null is None) for values in effect.trials()})
+def _shapes(one: Chosen) -> int:
+    """From how many shapes, such as frequencies or knees, a search for an effect starts; one axle alone is one of the
+    choices that are tried after both."""
+    trials, numbers = one.effect.trials(), [each.name for each in one.effect.parameters if each.null is None]
+    count = len({tuple(values[name] for name in numbers) for values in trials})
+    return count * (len(AXLE.choices) if one.where else 1)
 
 
 def fit_roughly(score: float, base: Baseline, screen: Screened, least: float = -np.inf) -> list[CandidateFit]:

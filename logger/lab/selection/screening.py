@@ -21,10 +21,10 @@ from logger.lab.likelihood.map_fit import align
 from logger.lab.likelihood.noise_floor import excess_over_noise, gain_of_full_explanation
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.whittle import UNEXPLAINED
-from logger.lab.selection.evidence import FALSE_ALARM
+from logger.lab.selection.evidence import FALSE_ALARM, min_gain
 from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.runs import Run, are_on_rig
-from logger.vehicle.effect import Chosen, Effect, Misalignment, Scale, SensorEffect, chosen
+from logger.vehicle.effect import AXLE, Chosen, Effect, Misalignment, Scale, SensorEffect, chosen
 from logger.vehicle.effects.time_offset import EFFECT as TIME_OFFSET
 from logger.vehicle.named_parameters import FreeParameter, coordinates_of, read, with_coordinates
 
@@ -185,7 +185,8 @@ def shared_parameters(effect: Effect, values: Mapping[str, float]) -> dict[str, 
 
 def screen(base: Baseline, effect: Effect, misaligned: Sequence[Misalignment],
              near: Chosen | None = None) -> Screened:
-    """Trials of an effect on a model.
+    """Trials of an effect on a model. One of suspensions is tried in those of all wheels and, where that gains more than
+    chance, with the same numbers in those of each axle.
 
     misaligned    ways in which the runs may be misaligned
     near          the effect in whose place this one is tried; the fit that would begin at that itself is known
@@ -204,7 +205,8 @@ def screen(base: Baseline, effect: Effect, misaligned: Sequence[Misalignment],
         trials.append(trials[0] | {one.name: min(max(read(car, one.name), one.low), one.high) for one in known})
     found: dict[tuple[float, ...], dict[float, Trial]] = {}
     shape = next((one.name for one in effect.parameters if one.is_free and one.null is None), "")
-    for values in trials:
+
+    def try_out(values: dict[str, float]) -> None:
         choice = tuple(values[parameter.name] for parameter in effect.parameters if not parameter.is_free)
         one = chosen(effect, values)
         ways = [_trial_at_values(base, one) if effect.replaces else _trial_at_best_strength(base, one)]
@@ -214,6 +216,14 @@ def screen(base: Baseline, effect: Effect, misaligned: Sequence[Misalignment],
         by_shape = found.setdefault(choice, {})
         if (there := values.get(shape, 0.0)) not in by_shape or trial.gain > by_shape[there].gain:
             by_shape[there] = trial
+
+    for values in trials:
+        try_out(values)
+    if AXLE in effect.parameters and base.posterior.vehicle.rear is not None:
+        both = max((trial for by_shape in found.values() for trial in by_shape.values()), key=lambda one: one.gain)
+        if both.gain > min_gain(1):
+            for axle in AXLE.choices[1:]:
+                try_out({**both.one.values, AXLE.name: axle})
     best = [one for by_shape in found.values()
             for one in _optima([by_shape[value] for value in sorted(by_shape)])[:2]]
     best += _delayed_trials(base, effect, misaligned[0])

@@ -551,8 +551,8 @@ def names_of(model: FittedModel) -> list[str]:
 
 
 def _best_of_each(fits: Sequence[F]) -> list[F]:
-    """The best fit of each effect, best first."""
+    """The best fit of each effect, best first: in both axles, where one of them alone cannot be distinguished."""
     found: dict[str, F] = {}
-    for one in sorted(fits, key=lambda one: -one.gain):
+    for one in sorted(fits, key=lambda one: -one.gain - INDISTINGUISHABLE * (not one.chosen.where)):
         found.setdefault(one.effect.name, one)
-    return list(found.values())
+    return sorted(found.values(), key=lambda one: -one.gain)

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from logger.vehicle.effect import ForceEffect, Parameter, Scale
+from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale
 from logger.vehicle.laws import CornerLaws
 
 
@@ -20,6 +20,7 @@ class BumpStop(ForceEffect):
         Parameter("clearance_m", 0.04, 0.001, 0.3, None, Scale.LINEAR, (0.01, 0.02, 0.03, 0.045, 0.06),
                   "compression from rest at which the stop is met"),
         Parameter("stop_stiffness_n_per_m", 1e5, 0.0, 2e6, 0.0, Scale.LINEAR, (1e5,), "of the stop alone"),
+        AXLE,
     )
     source = "J. Reimpell, H. Stoll, J. W. Betzler, The Automotive Chassis (2001), 5.3: additional springs"
     signature = "short hard blows upward where the suspension is most compressed; elsewhere the model fits"

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import numpy.typing as npt
 
-from logger.vehicle.effect import ForceEffect, Parameter, Scale
+from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale
 from logger.vehicle.laws import CornerLaws
 
 Array = npt.NDArray[np.float64]
@@ -23,6 +23,7 @@ class DamperAsymmetry(ForceEffect):
     parameters = (
         Parameter("rebound_to_bump_ratio", 1.5, 0.1, 10.0, 1.0, Scale.LOG, (0.67, 1.5, 3.0),
                   "slope of the damper in extension over that in compression; the mean of the two stays"),
+        AXLE,
     )
     source = "J. C. Dixon, The Shock Absorber Handbook (2007), chapter 1: ratios of 2 to 3 are usual"
     signature = "the body sits lower while it shakes; peaks up and down differ, and the record has twice each frequency"

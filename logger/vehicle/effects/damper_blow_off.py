@@ -11,7 +11,7 @@ from types import SimpleNamespace
 import numpy as np
 import numpy.typing as npt
 
-from logger.vehicle.effect import ForceEffect, Parameter, Scale
+from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale
 from logger.vehicle.laws import CornerLaws
 
 Array = npt.NDArray[np.float64]
@@ -25,6 +25,7 @@ class DamperBlowOff(ForceEffect):
                   "suspension rate above which the slope is smaller"),
         Parameter("slope_ratio", 0.4, 0.0, 1.0, 1.0, Scale.LINEAR, (0.4,),
                   "slope beyond the knee over that before it"),
+        AXLE,
     )
     source = "J. C. Dixon, The Shock Absorber Handbook (2007), chapter 6: digressive characteristics"
     signature = "the damping falls as the road gets rougher: strong motions ring longer than in the model"

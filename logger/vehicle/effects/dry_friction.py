@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 from types import SimpleNamespace
 
-from logger.vehicle.effect import ForceEffect, Parameter, Scale
+from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale
 from logger.vehicle.laws import CornerLaws
 
 
@@ -22,6 +22,7 @@ class DryFriction(ForceEffect):
         Parameter("transition_velocity_m_per_s", 0.02, 0.0, 0.2, None, Scale.LINEAR, (0.0, 0.003, 0.02),
                   "rate at which the friction has grown to tanh(1) of its force; 0: at once", default=0.0,
                   step=0.0003),
+        AXLE,
     )
     source = "M. Mitschke, H. Wallentowitz, Dynamik der Kraftfahrzeuge (2014), chapter on suspension friction"
     signature = "on smooth stretches the springs lock and the body rides on its tires; rough ones change little"

@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 
-from logger.vehicle.effect import ForceEffect, Parameter, Scale, Sought
+from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Sought
 from logger.vehicle.laws import Between, CornerLaws, Seen
 
 
@@ -45,6 +45,7 @@ class Hysteresis(ForceEffect):
                   "over which the force would grow to that at its initial stiffness"),
         Parameter("sharpness_ratio", 1.0, 0.2, 10.0, None, Scale.LOG, (1.0,),
                   "exponent: the higher, the sharper the yield", default=1.0),
+        AXLE,
     )
     source = ("R. Bouc, Proc. 4th Conf. on Nonlinear Oscillation, Prague (1967) 315; Y.-K. Wen, J. Eng. Mech. Div. "
               "ASCE 102 (1976) 249")

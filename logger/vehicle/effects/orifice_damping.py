@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from logger.vehicle.effect import ForceEffect, Parameter, Scale, Sought
+from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Sought
 from logger.vehicle.laws import CornerLaws
 
 
@@ -17,6 +17,7 @@ class OrificeDamping(ForceEffect):
     parameters = (
         Parameter("quadratic_damping_n_s2_per_m2", 2000.0, 0.0, 2e4, 0.0, Scale.LINEAR, (500.0, 4000.0),
                   "force over the square of the suspension's rate"),
+        AXLE,
     )
     source = "J. C. Dixon, The Shock Absorber Handbook (2007), chapter 5: flow through an orifice"
     signature = "the damping grows with the motion: strong motions die away faster than weak ones"

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from logger.vehicle.effect import ForceEffect, Parameter, Scale, Sought
+from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Sought
 from logger.vehicle.laws import CornerLaws
 from logger.vehicle.vehicle import Vehicle
 
@@ -22,6 +22,7 @@ class Play(ForceEffect):
     parameters = (
         Parameter("half_gap_m", 0.0005, 0.0, 0.02, 0.0, Scale.LINEAR, (0.0002, 0.0008, 0.003),
                   "way from the middle in each direction, within which the spring does not answer"),
+        AXLE,
     )
     source = "M. Nordin, P.-O. Gutman, Automatica 38 (2002) 1633: mechanical systems with backlash, dead zone"
     signature = "small motions meet no spring, and resonances rise in frequency with the motion"

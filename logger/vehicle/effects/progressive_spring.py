@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-from logger.vehicle.effect import ForceEffect, Parameter, Scale
+from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale
 from logger.vehicle.laws import CornerLaws
 
 
@@ -17,6 +17,7 @@ class ProgressiveSpring(ForceEffect):
     parameters = (
         Parameter("cubic_stiffness_n_per_m3", 1e6, -2e7, 1e9, 0.0, Scale.LINEAR, (3e5, 3e6, 3e7),
                   "force per cube of the travel from rest, of each suspension"),
+        AXLE,
     )
     source = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (1979), 2.3 (the equation of Duffing)"
     signature = "the spring is stiffer at large travel: the body bounces faster on bumps than on a smooth road"

@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import replace
 from types import SimpleNamespace
 
-from logger.vehicle.effect import ForceEffect, Parameter, Scale
+from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale
 from logger.vehicle.laws import CornerLaws
 
 
@@ -19,6 +19,7 @@ class TopMountCompliance(ForceEffect):
     parameters = (
         Parameter("mount_stiffness_n_per_m", 2e5, 5e3, 1e8, float("inf"), Scale.RECIPROCAL, (6e4, 3e5, 1.5e6),
                   "of the mount of each damper"),
+        AXLE,
     )
     source = "J. C. Maxwell's series of spring and damper; J. C. Dixon, The Shock Absorber Handbook (2007), chapter 1"
     signature = "the dampers seem weaker at wheel hop than at body bounce, and hop is at a slightly higher frequency"
