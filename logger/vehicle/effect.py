@@ -329,8 +329,8 @@ class BodyEffect(Effect):
 
 
 class ForceEffect(Effect):
-    """A law of springs, dampers and tires: the same at every wheel, unless it asks which axle it is at (``laws.rear``) or
-    has ``AXLE`` among its parameters."""
+    """A law of springs, dampers and tires: the same at every wheel, unless it asks which axle it is at (``laws.rear``),
+    or has ``AXLE`` among its parameters."""
 
     @abstractmethod
     def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:

@@ -32,7 +32,8 @@ def answer(kind: str, family: str | None, after: float = 0.1) -> Record:
 
 
 def test_every_effect_off_the_list_has_a_family_and_every_meaning_a_name() -> None:
-    assert RIGHT.keys() == OUTSIDERS.keys() | NEWCOMERS.keys()
+    of_the_list_in_one_axle = {"one_axle_friction"}
+    assert RIGHT.keys() == (OUTSIDERS.keys() | NEWCOMERS.keys()) - of_the_list_in_one_axle
     assert RIGHT.keys() > PHASES_OF_THEIR_OWN
     for right in RIGHT.values():
         assert right.meanings and all(NAMES[meaning] for meaning in right.meanings)

@@ -23,7 +23,7 @@ from logger.store.formats.effect_file import check_on, shipped_effects
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle import effects
 from logger.vehicle.compose import compose, recorded
-from logger.vehicle.effect import BodyEffect, Chosen, Effect, ForceEffect, Misalignment, Scale, chosen
+from logger.vehicle.effect import AXLE, BodyEffect, Chosen, Effect, ForceEffect, Misalignment, Scale, chosen
 from logger.vehicle.laws import CornerLaws, linear
 from logger.vehicle.own_effect import look_through, try_out, watched
 from logger.vehicle.simulate import Passage
@@ -150,6 +150,24 @@ def test_no_force_gives_energy_over_a_closed_round(name: str, amplitude_m: float
                                                               for law in laws.springs))
     assert suspension >= -1e-6 * scale
     assert tire >= -1e-6 * scale
+
+
+@pytest.mark.parametrize("name", [name for name in FORCES if AXLE in EFFECTS[name].parameters])
+def test_an_effect_of_suspensions_may_sit_in_those_of_one_axle_alone(name: str) -> None:
+    both, front, rear, none = (compose(HALF, effects).laws for effects in (
+        *([usual(EFFECTS[name], axle=axle)] for axle in AXLE.choices), []))
+
+    def works_n_m(laws: CornerLaws) -> list[float]:
+        return [work_n_m(laws, 0.03, 8.0)[0], float(laws.damper(np.array([1.0]))[0]), laws.mount_n_per_m,
+                sum(float(law(np.array([-0.06]))[0]) for law in laws.springs), float(len(laws.motions))]
+
+    assert works_n_m(front[0]) == works_n_m(both[0]) != works_n_m(none[0]) == works_n_m(rear[0])
+    assert works_n_m(rear[1]) == works_n_m(both[1]) != works_n_m(none[1]) == works_n_m(front[1])
+
+
+def test_a_car_of_one_axle_has_no_other() -> None:
+    with pytest.raises(BadInput, match="dry_friction: expected axle 0, as a quarter car has one alone"):
+        check_on(QUARTER, usual(EFFECTS["dry_friction"], axle=2.0), two_tracks=False)
 
 
 @pytest.mark.parametrize("name", FORCES)

@@ -185,8 +185,8 @@ def shared_parameters(effect: Effect, values: Mapping[str, float]) -> dict[str, 
 
 def screen(base: Baseline, effect: Effect, misaligned: Sequence[Misalignment],
              near: Chosen | None = None) -> Screened:
-    """Trials of an effect on a model. One of suspensions is tried in those of all wheels and, where that gains more than
-    chance, with the same numbers in those of each axle.
+    """Trials of an effect on a model. One of suspensions is tried in those of all wheels and, where it gains more there
+    than chance, with the same numbers in those of each axle.
 
     misaligned    ways in which the runs may be misaligned
     near          the effect in whose place this one is tried; the fit that would begin at that itself is known

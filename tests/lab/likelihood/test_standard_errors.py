@@ -128,7 +128,8 @@ def test_an_error_at_a_bound_is_not_halved(name: str, key: str, value: float | N
     value = parameter.high if value is None else value
     error = 50.0 * parameter.high if error is None else error
     one = chosen(effect, {**effect.usual, key: value})
-    (with_error,) = with_standard_errors((one,), free_parameters_of((one,)), np.full(len(effect.parameters), 50.0))
+    free = free_parameters_of((one,))
+    (with_error,) = with_standard_errors((one,), free, np.full(len(free), 50.0))
     assert with_error.standard_errors[key] == pytest.approx(error, rel=1e-3)
 
 

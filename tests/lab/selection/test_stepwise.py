@@ -66,6 +66,14 @@ def test_what_is_missing_is_found_and_nothing_else(offset_base: Baseline, found:
     assert [one.gain for one in found.first.fits] == sorted((one.gain for one in found.first.fits), reverse=True)
 
 
+@pytest.mark.parametrize("axle", [0.0, *slow(1.0, 2.0)])
+def test_what_sits_in_one_axle_alone_is_found_there(axle: float) -> None:
+    base = base_of(secret_runs([hidden("damper_asymmetry", rebound_to_bump_ratio=2.0, axle=axle)]))
+    (one,) = search(("damper_asymmetry", "tire_damping")).run(base).now.effects
+    assert one.values["axle"] == axle
+    assert one.values["rebound_to_bump_ratio"] == pytest.approx(2.0, rel=0.1)
+
+
 def test_how_many_threads_search_makes_no_difference(offset_base: Baseline, found: Selection) -> None:
     alone = search(FEW, workers=1).run(offset_base)
     assert alone.gains == found.gains

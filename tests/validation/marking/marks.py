@@ -88,6 +88,15 @@ def unexplained(record: Record) -> bool:
     return bool(record["said"] and record["said"]["unexplained"])
 
 
+def off_list_seen(record: Record) -> bool:
+    """What is off the list was said to be there: as something that no candidate explains or, where it is an effect of
+    the list in one axle alone, by that name at an axle."""
+    akin = {name for one in record["truth"]["outsiders"] for name in one["akin"]}
+    return unexplained(record) or any(
+        one["effect"] in akin & set(verdict(record)) and one["parameters"].get("axle")
+        for one in (record["said"] or {"candidates": ()})["candidates"])
+
+
 def alarm(record: Record) -> bool:
     """Anything was said to be missing, or nothing was said at all."""
     return record["said"] is None or bool(verdict(record)) or unexplained(record)
@@ -122,7 +131,7 @@ def right(record: Record) -> bool:
     """The answer that its kind asks for."""
     kinds: dict[str, Callable[[Record], bool]] = {
         "none": lambda one: not alarm(one), "one": first_right, "two": all_named, "three": all_named,
-        "outsider": unexplained, "two_outsider": unexplained, "wandering": right_on_wandering,
+        "outsider": off_list_seen, "two_outsider": off_list_seen, "wandering": right_on_wandering,
     }
     return kinds[record["kind"]](record)
 
@@ -250,7 +259,8 @@ def goals(records: Sequence[Record]) -> list[Goal]:
         Goal("Two effects: both named", 0.75, True, share(of_kind(records, "two"), all_named)),
         Goal("Three effects that stand out: all named", 0.70, True,
              share([record for record in of_kind(records, "three") if not unseen(record)], all_named)),
-        Goal("Off the list: unexplained", 0.80, True, share(of_kind(records, "outsider", "two_outsider"), unexplained)),
+        Goal("Off the list: unexplained", 0.80, True,
+             share(of_kind(records, "outsider", "two_outsider"), off_list_seen)),
         Goal("Nothing off the list, distances right: unexplained", 0.05, False, share(others, unexplained)),
         Goal("Distances that wander: one effect or nothing, rightly, nothing unexplained", 0.80, True,
              share(of_kind(records, "wandering"), right_on_wandering)),

@@ -37,6 +37,7 @@ from ..marking.marks import (
     numbers,
     numbers_right,
     of_kind,
+    off_list_seen,
     right,
     said,
     share,
@@ -139,7 +140,7 @@ def _by_strength(records: Sequence[Record]) -> Table:
             ("One effect: right first, or named as confused", one, first_right),
             ("Two effects: both named", two, all_named),
             ("Three effects: all named", three, all_named),
-            ("Off the list: unexplained", out, unexplained),
+            ("Off the list: unexplained", out, off_list_seen),
             ("Effects found: error within 10 % of the noise floor", listed, near),
             ("Effects found: numbers right", listed, numbers_right)):
         found = [share(in_class(asked, low, high), holds) for _, low, high in CLASSES]
