@@ -9,6 +9,7 @@ import sys
 from types import ModuleType
 
 from logger.vehicle.effect import (
+    AXLE,
     ActuatorEffect,
     BodyEffect,
     DriveEffect,
@@ -28,6 +29,7 @@ from logger.vehicle.structure import Structure, hung
 from logger.vehicle.vehicle import Vehicle
 
 __all__ = [
+    "AXLE",
     "ActuatorEffect",
     "Between",
     "BodyEffect",
