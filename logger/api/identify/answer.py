@@ -226,12 +226,13 @@ def _on_measured_roads(given: Model, records: list[Record], question: IdentifyQu
 def _with_unknown_numbers(given: vehicle_file.CarModel, word: str, records: Sequence[Record],
                           question: IdentifyQuestion) -> IdentifyQuestion:
     """The question with those numbers free as well that the vehicle's file calls unknown; where none is named, all that
-    it does not know exactly, those of its effects too. BadInput where it knows all."""
+    it does not know exactly, those of its effects too, but for what an effect has by default. BadInput where it knows
+    all."""
     known, free = given.known, [*(question.free or ())]
     if question.free is None:
         free = [name for name in known if known[name].words != UNKNOWN]
         free += [f"{one.effect.name}.{parameter.name}" for one in given.effects for parameter in one.effect.parameters
-                 if parameter.is_free]
+                 if parameter.is_free and one.values[parameter.name] != parameter.default]
     named = {one.replace(f"{BOTH}.", f"{axle}.") for one in free for axle in AXLES}
     free += [name for name, one in known.items() if one.words == UNKNOWN and name not in named]
     if not free and question.free is None:
