@@ -93,6 +93,16 @@ def test_numbers_of_the_rig_are_identified(bench: Path, run: str, capsys: pytest
         main(["identify", "--vehicle", str(bench / "true.yaml"), str(bench / "random"), "--free", "speed_scale"])
 
 
+def test_times_in_milliseconds_are_refused_at_once(bench: Path, tmp_path: Path) -> None:
+    run = shutil.copytree(bench / "random", tmp_path / "run")
+    lines = (run / "drive.csv").read_text().splitlines()
+    rows = [line.split(",") for line in lines[1:]]
+    (run / "drive.csv").write_text("\n".join(
+        [lines[0], *(",".join([f"{1000 * float(time_s):.10g}", *more]) for time_s, *more in rows)]))
+    with pytest.raises(BadInput, match=r"drive\.csv: expected .* samples a second or more, .*t_s in ms"):
+        main(["identify", "--vehicle", str(bench / "true.yaml"), str(run), "--free", "sprung_mass_kg"])
+
+
 def test_a_fit_with_coloured_noise_that_ends_at_a_bound_says_what_to_try(
         bench: Path, capsys: pytest.CaptureFixture[str]) -> None:
     words = ["identify", "--vehicle", str(bench / "true.yaml"), str(bench / "sweep"), "--free", "sprung_mass_kg",

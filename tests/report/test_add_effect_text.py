@@ -87,6 +87,8 @@ def test_the_number_that_was_biased_most_is_reported_with_how_wrong_it_was() -> 
                     "rear.tire_stiffness_n_per_m came out 25.0% too high, 20.0 standard errors from its value with it.")
     low = bias(("dry_friction", "sensor_gain"), [MASS])
     assert "Without dry_friction and sensor_gain" in low and "3.4% too low" in low and low.endswith("with them.")
+    none = replace(MASS, name="stiffness_n_per_m", without=1086.0, found=6.7, standard_error=0.6)
+    assert "stiffness_n_per_m came out 1079 N/m too high" in bias(FOUND.names, [none])
     many = [replace(MASS, name=f"number{i}") for i in range(6)]
     assert "number0, number1, number2, number3 and 2 more." in bias(FOUND.names, many)
 

@@ -18,7 +18,7 @@ import numpy as np
 from logger.api.drives import Run, read_run, run_on_road
 from logger.api.identify.question import MEASURED, OBSTACLES, SAME, IdentifyQuestion
 from logger.api.lab.bench import slow_words, word_of
-from logger.api.lab.checks import check_channels, check_decay, check_roads, moves_freely, of_rates
+from logger.api.lab.checks import check_channels, check_decay, check_rate, check_roads, moves_freely, of_rates
 from logger.api.question import each, function, paths_of
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, check_forces, model_of
@@ -176,6 +176,8 @@ def _records(drives: Sequence[Run], question: IdentifyQuestion, vehicle: Vehicle
                        f"{rates_hz[run]:g}")
     for drive, record in zip(drives, records, strict=True):
         check_forces(vehicle, record.track, str(drive.path / RUN))
+        if record.timed:
+            check_rate(drive, drive.path / DRIVE, vehicle)
         check_decay(drive, drive.path / DRIVE)
         check_channels(drive, drive.path / DRIVE, vehicle)
     return [of_rates(record) for record in records] if moves_freely(vehicle) else records

@@ -599,14 +599,24 @@ def _least_hz(drive: Drive, vehicle: Vehicle | None) -> tuple[float, str]:
     """The fewest samples a second that show what the lab looks at, and what that is: on a rig the vehicle's slowest
     vibration, and on a road the wheels' hop."""
     from logger.lab.likelihood.whittle import HIGHEST_OF_RATE
-    from logger.store.formats.drive_file import DriveOnRoad
     from logger.vehicle.models import structure_of
     from logger.vehicle.modes import undamped_frequencies_hz
 
-    if vehicle is None or not isinstance(drive, DriveOnRoad) or not drive.track.timed:
+    track = getattr(drive, "track", None)
+    if vehicle is None or track is None or not track.timed:
         return _LEAST_RATE_HZ, "the wheels hop"
     slowest_hz = float(undamped_frequencies_hz(structure_of(vehicle))[0])
     return slowest_hz / HIGHEST_OF_RATE, f"its vibration at {slowest_hz:.3g} Hz"
+
+
+def check_rate(drive: Drive, file: Path, vehicle: Vehicle | None) -> None:
+    """Raise BadInput for a drive of fewer samples a second than what is looked at needs."""
+    from logger.bounds import time_hint
+
+    least_hz, seen = _least_hz(drive, vehicle)
+    if drive.rate_hz < (1 - _CLOCK) * least_hz:
+        raise BadInput(f"{file}: expected {least_hz:.4g} samples a second or more, to see {seen}, found "
+                       f"{drive.rate_hz:.4g}{time_hint(drive.rate_hz)}")
 
 
 def check_record(drive: Drive, file: Path, others: Sequence[Drive], vehicle: Vehicle | None = None) -> None:
@@ -614,16 +624,12 @@ def check_record(drive: Drive, file: Path, others: Sequence[Drive], vehicle: Veh
     another rate than the others, recorded nothing, or repeats samples."""
     import numpy as np
 
-    from logger.bounds import time_hint
     from logger.dsp.repeated_samples import find_repeats
     from logger.runs import READING, begins_freely, unknown_past_s
 
     track = getattr(drive, "track", None)
     past_s, shortest_s = unknown_past_s(track), least_s(drive, vehicle)
-    least_hz, seen = _least_hz(drive, vehicle)
-    if drive.rate_hz < (1 - _CLOCK) * least_hz:
-        raise BadInput(f"{file}: expected {least_hz:.4g} samples a second or more, to see {seen}, found "
-                       f"{drive.rate_hz:.4g}{time_hint(drive.rate_hz)}")
+    check_rate(drive, file, vehicle)
     lasts_s = len(drive.time_s) / drive.rate_hz
     if lasts_s < shortest_s:
         raise BadInput(f"{file}: expected a record of {shortest_s:.3g} s or longer, found {lasts_s:.3g} s")

@@ -55,7 +55,7 @@ from logger.report.document import (
     section,
     tiles,
 )
-from logger.report.quantities import chance, columns, finite, numbers_of, signal_errors, wrapped
+from logger.report.quantities import chance, columns, finite, numbers_of, signal_errors, unit_of, wrapped
 from logger.runs import Run, are_on_rig, normalised_rms_error, runs_left_out, short_names
 from logger.store.formats import vehicle_file
 from logger.vehicle.effect import Effect
@@ -643,7 +643,15 @@ def bias(names: Sequence[str], moved: Sequence[Number]) -> str:
 
 def _too_much(one: Number) -> str:
     """By how much a number came out wrong without the effects."""
-    return f"{abs(one.without / one.found - 1):.1%} too {'high' if one.without > one.found else 'low'}"
+    return f"{_change(one.name, one.found, one.without)[1:]} too {'high' if one.without > one.found else 'low'}"
+
+
+def _change(name: str, before: float, after: float) -> str:
+    """From one value to another, in per cent; in its unit where it is ten times as large as the first, or more: of
+    what is next to 0 a share says nothing."""
+    if abs(after - before) < 10 * abs(before):
+        return f"{(after - before) / abs(before):+.1%}"
+    return f"{after - before:+.4g} {unit_of(name)}"
 
 
 MOVED_HEADS = ("Parameter", "Now", "Without", "With", "Shift", "")
@@ -655,8 +663,9 @@ MOVED_HINT = ("Now: the value in the new file. Without, With: refitted without a
 def moved_rows(moved: Sequence[Number]) -> Iterator[tuple[str, str, str, str, str, str]]:
     """Under ``MOVED_HEADS``."""
     for one in moved:
-        yield (one.name, f"{one.found:.5g}", f"{one.without / one.nominal - 1:+.1%}",
-               f"{one.found / one.nominal - 1:+.1%} ± {one.standard_error / one.found:.1%}", f"{one.shift:+.1f}",
+        error = _change(one.name, one.found, one.found + one.standard_error)[1:]
+        yield (one.name, f"{one.found:.5g}", _change(one.name, one.nominal, one.without),
+               f"{_change(one.name, one.nominal, one.found)} ± {error}", f"{one.shift:+.1f}",
                "was biased" if one.biased else "")
 
 
