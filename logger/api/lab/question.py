@@ -177,6 +177,11 @@ class LearnQuestion(LabQuestion):
     _: KW_ONLY
     effect_files: EffectFiles = ()
 
+    def check_written(self, files: Mapping[str, Sequence[Path]]) -> None:
+        """A page alone would lose the law."""
+        if all(path.suffix.lower() == ".html" for path in files["--out"]):
+            raise self.complaint("--out: expected the law's file as well, such as law.py")
+
 
 @dataclass(frozen=True)
 class PlanQuestion(LabQuestion):
