@@ -42,8 +42,9 @@ _UNITS = (
 # The same on rigs, by what is measured: readings in a unit over those in N, m or m/s2.
 _LENGTHS = (("mm", 1000.0), ("cm", 100.0), ("inches", 12 / FOOT_M))
 _SIZES = {"force": (("kN", 1e-3), ("kgf", 1 / STANDARD_GRAVITY_MPS2), ("lbf", 1 / LBF_N)), "length": _LENGTHS,
+          "velocity": tuple((f"{unit}/s", size) for unit, size in _LENGTHS),
           "acceleration": tuple((unit, size) for what, unit, size in _UNITS if what == _RECORD)}
-_KINDS = {"displacement": "length", "travel": "length", "velocity": "length"}
+_KINDS = {"displacement": "length", "travel": "length"}
 _APART = 2.0  # kgf and lbf are
 _SENSOR_GAIN = (0.2, 5.0)
 """Within these a factor may be a sensor's: the bounds of the effect ``sensor_gain``."""
