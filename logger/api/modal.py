@@ -31,6 +31,7 @@ from logger.store.formats.drive_file import header_of
 from logger.store.formats.record_checks import SPEED as SPEED_COLUMN
 from logger.store.formats.record_checks import ChannelRecord
 from logger.store.formats.record_file import VERTICAL
+from logger.store.formats.vehicle_file import check_moves_itself
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
@@ -146,6 +147,7 @@ def vehicle_modes(
     IRI.check("iri_m_per_km", iri_m_per_km)
     SPEED.check("speed_mps", speed_mps)
     model = model_of(vehicle)
+    check_moves_itself(model.vehicle)
     psd = RoadSpectrum.of_iri(iri_m_per_km).psd(WAVE_NUMBERS_CPM)
     try:
         known = known_vehicle(model.vehicle, model.effects)

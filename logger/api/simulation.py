@@ -46,7 +46,7 @@ from logger.store.formats.drive_file import (
     write_profile,
 )
 from logger.store.formats.effect_file import effect_named
-from logger.store.formats.vehicle_file import CarModel, read_model
+from logger.store.formats.vehicle_file import CarModel, check_moves_itself, read_model
 from logger.vehicle.compose import Car, with_effect
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.structure import Output, Structure, body_point, suspension_travel, tire_deflection, wheel
@@ -111,6 +111,7 @@ class Simulation(CommandResult):
 def simulation(question: SimulateCommand) -> Simulation:
     """The answer to ``SimulateCommand``, which says what is raised."""
     model, effects, said = _model(str(question.vehicle), question.effects)
+    check_moves_itself(model.vehicle)
     doubt = ""
     if question.excitation is not None:
         place = question.excitation.parent

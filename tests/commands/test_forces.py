@@ -123,6 +123,16 @@ def test_every_signal_of_a_rig_on_a_shaken_base_under_forces_is_exact(
         assert ridelog.compare(tmp_path / "bench.yaml", [alone]).error < 1e-3, name
 
 
+def test_a_part_alone_has_no_motion_of_its_own(tmp_path: Path) -> None:
+    part = tmp_path / "damper.yaml"
+    part.write_text("name: damper\nmodel: component\nstiffness_n_per_m: 0\ndamping_n_s_per_m: 1500\n")
+    moved = tmp_path / "excitation.csv"
+    moved.write_text("t_s,displacement_m\n" + "".join(f"{0.01 * n:.2f},0\n" for n in range(20)))
+    for asked in (["modes"], ["simulate", "--excitation", str(moved), "--out", str(tmp_path / "drive.csv")]):
+        with pytest.raises(BadInput, match="damper: expected a mass that moves, found model: component"):
+            main([*asked, "--vehicle", str(part)])
+
+
 def test_a_step_of_force_on_a_free_axis_is_what_the_textbook_says(tmp_path: Path) -> None:
     """From rest at 0: v = F / c (1 - exp(-c t / m))."""
     (tmp_path / "axis.yaml").write_text(Bench(95.0, 0.0, 200.0).yaml)

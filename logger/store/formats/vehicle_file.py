@@ -142,6 +142,12 @@ def check_on_road(vehicle: Vehicle) -> None:
         raise BadInput(f"{vehicle.name}: expected a car, found model: {vehicle.model}, which stands on a test bench")
 
 
+def check_moves_itself(vehicle: Vehicle) -> None:
+    """Raise BadInput for a part alone, which its bench moves: what it answers with is a force."""
+    if vehicle.model == "component":
+        raise BadInput(f"{vehicle.name}: expected a mass that moves, found model: component, which its bench moves")
+
+
 def read_on_board(path: Path | str) -> CarModel:
     """Read a vehicle file as ``read_model``, but for effects of a user's own: they are not run but refused (BadInput),
     and so are parts on a test bench.
