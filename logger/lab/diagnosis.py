@@ -22,6 +22,7 @@ from logger.lab.likelihood.noise_floor import (
     NoiseLevel,
     SignalErrors,
     excess_by_signal,
+    excess_over_noise,
     floor_error,
     sensor_noise_with_rounding,
     signal_errors_of,
@@ -343,8 +344,20 @@ def _fit_finely(search: Search, selection: Selection) -> tuple[Selection, Linear
                    for one in errors.effects[search.present:]}
             weakest = min(far, key=far.__getitem__, default=None)
             if weakest is None or far[weakest] > UNUSUAL_SIGMA:
+                weakest = _of_a_sensor(search, selection, after)
+            if weakest is None:
                 return selection, after
             selection = search.without_effect(selection, weakest)
+
+
+def _of_a_sensor(search: Search, selection: Selection, after: LinearModel) -> str | None:
+    """Where something unknown is left, an effect of the sensor that explains less than half of what there is without
+    it: whatever filters or shifts a record imitates a part of any motion. None: there is no such effect."""
+    if excess_over_noise(after.posterior, after.state, FALSE_ALARM) <= UNEXPLAINED:
+        return None
+    named = [one.effect for one in selection.now.effects if one.effect.name in selection.gains]
+    return next((one.name for one in named if isinstance(one, SensorEffect)
+                 and not search.likelihood.explains_most(search.without(selection.now, one.name), selection.now)), None)
 
 
 def _steps(selection: Selection, nominal_error: float) -> tuple[ErrorStep, ...]:

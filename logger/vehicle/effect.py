@@ -392,11 +392,13 @@ class Chosen:
     @property
     def at_bound(self) -> bool:
         """Whether an effect that has a strength has it in a shape at the end of its range (a frequency, a damping), or
-        can be no weaker: what looks like it is something else."""
+        can be no weaker, or shifts a record as far as it may: what looks like it is something else."""
         numbers = [one for one in self.effect.parameters if one.is_free]
         besides = [one for one in numbers if one.name in self.effect.also_by]
         if (any(one.at_weakest_bound(self.values[one.name]) for one in numbers)
                 and all(one.is_lowest(self.values[one.name]) for one in besides)):
+            return True
+        if not self.effect.reshapes and any(one.at_bound(self.values[one.name]) for one in numbers):
             return True
         shapes = [one for one in numbers if one.null is None and one.scale is Scale.LOG]
         return len(shapes) < len(numbers) and any(one.at_bound(self.values[one.name]) for one in shapes)

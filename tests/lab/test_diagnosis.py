@@ -12,15 +12,18 @@ from logger.lab.diagnosis import (
     ALREADY_PRESENT,
     LAID_BY_THE_ROAD,
     LabDiagnosis,
+    assess,
     diagnose,
     obstacles_of,
+    refit,
 )
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.selection.evidence import FALSE_ALARM, probability_by_chance
+from logger.lab.selection.stepwise import Search, SearchRound, Selection
 from logger.runs import RecordFacts, Run
 from logger.simulation.virtual_drive import SimulatedRuns
-from logger.vehicle.effect import Chosen, chosen
+from logger.vehicle.effect import Chosen, Misalignment, chosen
 from logger.vehicle.named_parameters import changed, read
 
 from ..support.lab.runs_with_residual import CAR, measuring
@@ -173,6 +176,22 @@ def test_what_no_candidate_explains_is_unexplained_and_imitations_are_not_named(
     assert found.verdict == () and found.exceeds_noise and found.unexplained
     assert found.excess > UNEXPLAINED and found.shape is not None
     assert min(one.p_value for one in found.candidates) < FALSE_ALARM  # more than noise, and yet nothing
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("there, verdict", [(("dry_friction", "sensor_bandwidth"), ()),
+                                            (("sensor_bandwidth",), ("sensor_bandwidth",))])
+def test_a_sensor_that_explains_little_beside_what_is_unknown_is_not_named(
+        there: tuple[str, ...], verdict: tuple[str, ...]) -> None:
+    values = {"dry_friction": {"friction_force_n": 200.0}, "sensor_bandwidth": {"cutoff_hz": 25.0}}
+    posterior = posterior_of(secret_runs([hidden(name, **values[name]) for name in there]))
+    low_pass = EFFECTS["sensor_bandwidth"]
+    before, now = (refit(posterior, posterior.start(effects)) for effects in (
+        [], [hidden("sensor_bandwidth", **values["sensor_bandwidth"])]))
+    selection = Selection(before, now, {low_pass.name: before.score - now.score}, {}, SearchRound((), ()),
+                          ((low_pass.name, now.hold_out),))
+    found = assess(posterior, {low_pass.name: low_pass}, [], Search([low_pass], 0, Misalignment(1.0, 0.0)), selection)
+    assert found.verdict == verdict and found.exceeds_noise is not bool(verdict)
 
 
 def test_effects_that_cannot_be_tried_are_named_with_the_reason(flawless: SimulatedRuns, offset: LabDiagnosis) -> None:

@@ -44,3 +44,9 @@ def test_friction_of_the_body_alone_is_no_friction_that_could_be_no_weaker() -> 
     assert not chosen(friction, {"friction_force_n": 0.0, "body_friction_force_n": 0.5}).at_bound
     assert not chosen(friction, {"friction_force_n": 0.5}).at_bound
     assert chosen(friction, {"friction_force_n": 0.0, "body_friction_force_n": 0.0}).at_bound
+
+
+def test_a_shift_as_far_as_it_may_be_is_no_shift() -> None:
+    late = EFFECTS["time_offset"]
+    assert [chosen(late, {"delay_s": delay_s}).at_bound for delay_s in (-2.0, -0.3, 0.0, 2.0)] == [
+        True, False, False, True]

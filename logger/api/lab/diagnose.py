@@ -394,7 +394,7 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
     if dropped:
         why = ("the others explain the same" if found.verdict else
                "its parameter ended at a bound, or where the effect vanishes")
-        lines.append(f"Tried and dropped: {', '.join(dropped)} ({why}).")
+        lines.append(f"Tried and dropped: {', '.join(dropped)} ({why}, or it explains little beside what is unknown).")
     return lines
 
 
