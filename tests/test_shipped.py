@@ -9,6 +9,7 @@ from pathlib import Path
 import pytest
 
 from logger.errors import BadInput
+from logger.report.document import STYLE_SHEETS
 from logger.report.page import SCRIPTS
 from logger.shipped import vehicle_file, vehicle_path
 from logger.studies.field.measurements import COUNTS
@@ -30,7 +31,7 @@ def test_the_page_s_script_and_style_are_in_the_package() -> None:
         shipped = {path.name for pattern in settings["tool"]["setuptools"]["package-data"]["logger.report"]
                    for path in place.glob(pattern)}
         assert shipped == {path.name for path in (place / "assets").iterdir()}
-    assert {*SCRIPTS, "page.css"} == shipped
+    assert {*SCRIPTS, *STYLE_SHEETS, "page.css"} == shipped
 
 
 def test_the_counts_of_the_examination_are_in_the_package() -> None:

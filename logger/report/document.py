@@ -74,8 +74,9 @@ def asset(name: str, package: str = "logger.report") -> str:
     return (resources.files(package) / "assets" / name).read_text("utf-8")
 
 
-_LIGHT, _DARK, _CHART, _PAGE = (before + "\n" + asset(f"{name}.css") for before, name in (
-    (_COLOURS, "light"), ("", "dark"), ("", "chart"), ("", "document")))
+STYLE_SHEETS = ("light.css", "dark.css", "chart.css", "document.css")
+_LIGHT, _DARK, _CHART, _PAGE = ("\n" + asset(name) for name in STYLE_SHEETS)
+_LIGHT = _COLOURS + _LIGHT
 STYLE = (f":root{{{_LIGHT}}}@media screen and (prefers-color-scheme:dark){{:root:not([data-paper]){{{_DARK}}}}}"
          f"{_CHART}{_PAGE}")
 """Of a page."""
