@@ -348,7 +348,9 @@ class Search(Generic[M, P, F]):
         with the recorded distances: what they do may have been taken for a start or scale error.
 
         Fits are dear. One is made as long as its effect may still gain what has to be gained: more than chance does, or
-        the effect in whose place it is tried, and then what the best fit that may be taken has gained.
+        the effect in whose place it is tried, and then what the best fit that may be taken has gained. On a model that
+        has none yet the best fit so far may be of an imitation, and the right effect far from where it was screened:
+        there all that gain more than chance are fitted.
 
         instead_of    the effect in whose place they are tried; None: in addition
         base          the model on which they are screened; None: this one
@@ -366,7 +368,8 @@ class Search(Generic[M, P, F]):
                 worth += self._may_win(there, self._screen_all(pool, there, aligning), effort.fit_share * to_gain)
             self.progress(f"fitting {len(worth)} of them")
             tries = self._fit_all_roughly(pool, now.score, worth[:1], 0.0)
-            to_gain = max(to_gain, self._reached(now, tries))
+            if instead_of is not None or len(names_of(now)) > self.present:
+                to_gain = max(to_gain, self._reached(now, tries))
             enough = effort.fit_share * to_gain
             tries += self._fit_all_roughly(pool, now.score, [
                 pair for pair in worth[1:] if pair[1].gain > enough or not pair[1].effect.reshapes], enough)
