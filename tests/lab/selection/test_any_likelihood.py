@@ -133,8 +133,8 @@ def test_what_promises_too_little_beside_a_fit_that_may_be_taken_is_not_fitted(d
     sought.effort = replace(sought.effort, fit_share=0.6)
     found = sought.run(Made())
     first, *others = (name for name, before in sought.likelihood.fitted if not before)
-    # Of 300 the others promise less than 0.6; what a delay gains by its screening says nothing.
-    assert first == "sensor_gain" and others == ["time_offset"]
+    # The others promise less than 0.6 of 300; on a model without effects all that promise more than chance are fitted.
+    assert first == "sensor_gain" and others == ["tire_damping", "sensor_offset", "time_offset"]
     second = [name for name, before in sought.likelihood.fitted if before == 1]
     assert second[0] == "tire_damping" and ("sensor_offset" in second) == fitted
     assert len(found.gains) == 3 - len(doubtful)
