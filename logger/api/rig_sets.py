@@ -106,9 +106,9 @@ class Improved:
 
     @property
     def effects(self) -> Table:
-        """What was named, with its numbers."""
-        rows = [(one.effect, name, value, one.standard_errors.get(name))
-                for one in self.added for name, value in one.parameters.items()]
+        """What was named, with the numbers that were found."""
+        rows = [(one.effect, name, one.parameters[name], error)
+                for one in self.added for name, error in one.standard_errors.items()]
         return Table("What diagnose named and add-effect found", (
             Column("effect"), Column("number"), Column("found", ".5g"), Column("its standard error", ".2g")),
             tuple(rows) or (("nothing", "", None, None),))

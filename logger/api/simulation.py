@@ -20,6 +20,7 @@ from logger.chart_data import Array, Chart
 from logger.errors import BadInput
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
+from logger.report.quantities import numbers_of
 from logger.roads.iri import doubt_of
 from logger.shipped import vehicle_path
 from logger.simulation.virtual_drive import (
@@ -146,7 +147,7 @@ def simulation(question: SimulateCommand) -> Simulation:
     }
     more = f"; also {', '.join(list(columns)[len(COLUMNS):])}" * (len(columns) > len(COLUMNS))
     for one in effects:
-        more += f"\n  with {one.effect.name}" + "".join(f", {name} {value:g}" for name, value in one.values.items())
+        more += f"\n  with {one.effect.name}, {numbers_of(one)}"
     along = (f"{run.distance_m[0]:.2f} to {run.distance_m[-1]:.2f} m at {run.speed_mps.mean():.2f} m/s on average, "
              * (not track.timed))
     return Simulation(

@@ -36,7 +36,7 @@ def test_a_command_that_is_nearly_right_is_guessed(capsys: pytest.CaptureFixture
     (["iri", "p.csv", "q.csv"], "expected no q.csv (try"),
     (["fleet", "frob"], "expected one of 'ingest', 'summarise', 'report', found 'frob' (try"),
     (["convert", "logs"], "expected --to (try"), (["export"], "expected --to (try"),
-    (["demo", "lap"], "expected one of 'car', 'field', 'lab', found 'lap' (try"),
+    (["demo", "--lab", "--field"], "--field: expected no --lab with it (try"),
 ])
 def test_wrong_use_is_said_as_everything_else(
     arguments: list[str], said: str, capsys: pytest.CaptureFixture[str]
