@@ -147,7 +147,7 @@ def simulation(question: SimulateCommand) -> Simulation:
     }
     more = f"; also {', '.join(list(columns)[len(COLUMNS):])}" * (len(columns) > len(COLUMNS))
     for one in effects:
-        more += f"\n  with {one.effect.name}, {numbers_of(one)}"
+        more += "\n  with " + ", ".join(filter(None, (one.effect.name, numbers_of(one))))
     along = (f"{run.distance_m[0]:.2f} to {run.distance_m[-1]:.2f} m at {run.speed_mps.mean():.2f} m/s on average, "
              * (not track.timed))
     return Simulation(
