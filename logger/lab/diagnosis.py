@@ -92,6 +92,8 @@ class LabDiagnosis:
     obstacles            effects that could not be tried, and why
     verdict              names of the effects that the model lacks, the most certain first
     excess               share by which the residual is above the noise in the run where it is largest
+    over_noise           as ``excess``, but over the noise alone, as if sensors had no gain that may be off; 0 where a
+                         test of the residual does not distinguish it from noise
     beyond               numbers of the car that the runs move beyond their tolerance, with their relative change
     in_conflict          whether one of these is farther off than numbers are by chance
     moved                the others that the runs move for sure: their relative change and its standard error, the
@@ -148,6 +150,7 @@ class LabDiagnosis:
     as_moved: Chosen | None = None
     best_linear: float | None = None
     shows_forces: bool = False
+    over_noise: float = 0.0
 
     @property
     def explained(self) -> tuple[float, float]:
@@ -160,6 +163,11 @@ class LabDiagnosis:
     def exceeds_noise(self) -> bool:
         """Whether the residual is above the sensor's noise."""
         return self.excess > UNEXPLAINED
+
+    @property
+    def within_calibration(self) -> bool:
+        """Whether the residual is above the sensor's noise, but no more than calibrated sensors may leave."""
+        return self.over_noise > UNEXPLAINED and not self.exceeds_noise
 
     @property
     def unexplained(self) -> bool:
@@ -237,8 +245,11 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
     excess = max(excess_of.values())
     baseline = fine.start(present)
     removed = removed_from(fine, baseline.predictions, state)
-    shape = shape_of(fine, state, removed) if excess > UNEXPLAINED else None
-    colour = None if shape is None else coloured_noise(fine.bands, shape)
+    over_noise = max(excess_by_signal(fine, state, FALSE_ALARM, sigma=0.0).values())
+    shape = shape_of(fine, state, removed) if max(excess, over_noise) > UNEXPLAINED else None
+    if shape is None or not shape.tests.found:
+        over_noise = 0.0  # a record of a second has few degrees of freedom in its quietest band
+    colour = None if shape is None or excess <= UNEXPLAINED else coloured_noise(fine.bands, shape)
     if colour is not None:
         noise, excess_of = colour, excess_by_signal(fine, state, FALSE_ALARM, colour)
         excess = max(excess_of.values())
@@ -253,6 +264,7 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
                                                                                fine.error(state)),
         candidates=(found := _candidates(selection, state, len(tried)))[0], no_better=found[1],
         obstacles=obstacles_of(posterior, effects, present), verdict=tuple(selection.gains), excess=excess,
+        over_noise=over_noise,
         beyond=(beyond := fine.prior.beyond_tolerance(state.logs, errors.covariance)),
         in_conflict=fine.prior.is_in_conflict(state.logs, errors.logs),
         moved={name: one for name, one in fine.prior.moved(

@@ -98,6 +98,16 @@ def test_beside_something_unexplained_it_is_only_part_or_an_imitation() -> None:
                     "times the sensor's noise. Beyond that noise it is less than 0.1% of the measured power.")
 
 
+def test_what_calibrated_sensors_may_leave_above_their_noise_is_said_too() -> None:
+    missing, left, *_ = diagnosis_summary(replace(FOUND, over_noise=0.5))
+    assert missing.startswith("dry_friction is missing")
+    assert left == ("Something more may be missing that no known effect explains: in the worst run the residual is 1.5 "
+                    "times the sensor's noise. Beyond that noise it is less than 0.1% of the measured power, as "
+                    "calibrated sensors may leave.")
+    nothing, *_ = diagnosis_summary(replace(NOTHING, over_noise=0.5))
+    assert nothing.endswith("the residual is hardly more than calibrated sensors may leave.")
+
+
 def test_what_no_candidate_explains_is_said_and_so_are_imitations_that_are_not_named() -> None:
     found = replace(NOTHING, excess=2.0)
     left, _ = diagnosis_summary(found)
@@ -157,6 +167,8 @@ def test_what_explains_as_well_is_named_with_the_drives_that_would_separate_them
     assert drives.startswith("dry_friction, damper_blow_off and sensor_gain explain the residual about equally well. ")
     for name in ("dry_friction", "damper_blow_off", "sensor_gain"):
         assert f"{name}: {EFFECTS[name].shown_by}" in drives
+    bench = replace(found, catalogue=dict.fromkeys(found.catalogue, found.catalogue["dry_friction"]))
+    assert f"distinguish them: {EFFECTS['dry_friction'].shown_by}. " in diagnosis_summary(bench)[1]
     assert diagnosis_json(found)["groups"] == [["dry_friction", "damper_blow_off", "sensor_gain"]]
     assert diagnosis_json(FOUND)["groups"] == [["dry_friction"]] and diagnosis_json(NOTHING)["groups"] == []
 

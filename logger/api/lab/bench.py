@@ -248,7 +248,8 @@ def _scales(word: str, model: CarModel, runs: SimulatedRuns) -> Scales | None:
         return None
     check_moves(word, model, runs)
     responses = runs.respond(compose(model.vehicle, model.effects))
-    travel_m, rate_mps = (float(np.sqrt(np.mean(np.concatenate(one) ** 2))) for one in (
+    # Where a part stands (its preload over a spring that nobody knows) is no motion.
+    travel_m, rate_mps = (float(np.std(np.concatenate([one - one.mean(axis=0) for one in some]))) for some in (
         [response.travel_m for response in responses], [response.rate_mps for response in responses]))
     front = model.vehicle.front
     forces_n = [np.hypot(front.suspension_stiffness_n_per_m * travel_m, front.suspension_damping_n_s_per_m * rate_mps),
@@ -267,8 +268,9 @@ def known_effects(model: CarModel, files: Sequence[str], on_rig: bool = False, s
     on_rig    as ``sought_effects``
     scales    as ``sized``
     """
-    sought, own = sought_effects(on_rig, model.vehicle.model == "component"), dict[str, str]()
-    effects = {name: sized(_shown_on_rig(one) if on_rig else one, model.vehicle, scales)
+    of_part = model.vehicle.model == "component"
+    sought, own = sought_effects(on_rig, of_part), dict[str, str]()
+    effects = {name: sized(_shown_on_rig(one.on(model.vehicle), of_part) if on_rig else one, model.vehicle, scales)
                for name, one in sought.items()}
     for one in model.effects:
         if one.file is not None:
@@ -285,13 +287,21 @@ def known_effects(model: CarModel, files: Sequence[str], on_rig: bool = False, s
     return effects, own
 
 
-def _shown_on_rig(effect: Effect) -> Effect:
-    """The same effect, of which no road is asked to show it."""
-    if effect.sought is not Sought.ALWAYS:
+def _shown_on_rig(effect: Effect, of_part: bool) -> Effect:
+    """The same effect, of which no road is asked to show it. A part has no natural frequency: what its law has a place
+    or a rate of, by its units, is shown by amplitudes or rates; anything else by frequencies."""
+    if effect.sought is Sought.ON_RIGS:
         return effect  # it speaks of rigs
-    found = copy(effect)
-    found.shown_by = ("excite it well above its natural frequencies" if isinstance(effect, SensorEffect) else
-                      "move it faster and farther, at several amplitudes, through its natural frequencies")
+    found, units = copy(effect), [one.name.partition("_per_")[2] for one in effect.parameters]
+    if not of_part:
+        found.shown_by = ("excite it well above its natural frequencies" if isinstance(effect, SensorEffect) else
+                          "move it faster and farther, at several amplitudes, through its natural frequencies")
+    elif any(unit in ("s", "m2") for unit in units):
+        found.shown_by = "move it by one amplitude, at rates far below, near and far above where its force changes"
+    elif any(one.name.endswith("_m") for one in effect.parameters) or "m3" in units:
+        found.shown_by = "move it at one rate, by amplitudes far below, near and far above where its force changes"
+    else:
+        found.shown_by = "move it both ways by one amplitude, at frequencies that are far apart"
     return found
 
 

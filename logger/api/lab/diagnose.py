@@ -365,22 +365,22 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
     if not found.missing and not found.unexplained:
         more = " else" * bool(found.removed.drifting_sensors or found.removed.distance_error_m > 0)
         what, how = ("No effect", "") if found.beyond else (f"Nothing{more}", " within their tolerance")
+        most = "calibrated sensors may leave" if found.within_calibration else "the sensor's noise"
         lines.append(f"{what} is missing: with the car's parameters refitted{how}, the residual is hardly more than "
-                     "the sensor's noise.")
+                     f"{most}.")
     if found.coloured and not found.exceeds_noise:
         lines.append("The sensor's noise is coloured (louder at some frequencies). It is as loud when the car shakes "
                      "little as when it shakes much, so it does not come from the road.")
     if found.exceeds_noise:
-        left = percent(max(found.final_error**2 - found.noise_floor_error**2, 0.0))
-        lines.append(f"Something {'more ' * bool(found.missing)}is missing that no known effect explains: in the worst "
-                     f"run the residual is {1 + found.excess:.3g} times the sensor's noise. Beyond that noise it is "
-                     f"{left} of the measured power.")
+        lines.append(_left_over(found, "is", found.excess) + ".")
         if found.contradicted_by:
             lines.append(f"It is in {enumerated(found.contradicted_by, 'and')} alone: the other signals are explained "
                          "to their noise. Check that sensor: its place, its sign, its filter.")
         if any(one.p_value < FALSE_ALARM and one.effect.name not in found.verdict for one in found.candidates):
             lines.append(f"Effects that improve the fit by less than {IMITATION:.0%} of a full explanation are not "
                          "named: they may only imitate what is missing.")
+    elif found.within_calibration:
+        lines.append(_left_over(found, "may be", found.over_noise) + ", as calibrated sensors may leave.")
     lines += [f"{name} reads {share:+.1%} against what all other signals say, which is more than a sensor is off by: "
               "check its scale and its unit. The effects were found with that taken out."
               for name, share in found.signals_off.items()]
@@ -396,6 +396,13 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
                "its parameter ended at a bound, or where the effect vanishes")
         lines.append(f"Tried and dropped: {', '.join(dropped)} ({why}, or it explains little beside what is unknown).")
     return lines
+
+
+def _left_over(found: LabDiagnosis, how: str, over: float) -> str:
+    left = percent(max(found.final_error**2 - found.noise_floor_error**2, 0.0))
+    return (f"Something {'more ' * bool(found.missing)}{how} missing that no known effect explains: in the worst run "
+            f"the residual is {1 + over:.3g} times the sensor's noise. Beyond that noise it is {left} of the measured "
+            "power")
 
 
 def _explained_power(found: LabDiagnosis) -> str:
@@ -493,8 +500,10 @@ def _faint(found: LabDiagnosis) -> list[str]:
 def _confusion(names: list[str], found: LabDiagnosis) -> str:
     """Which drive would separate effects that explain alike."""
     drives = [f"{name}: {found.catalogue[name].shown_by}" for name in names]
+    alike = {found.catalogue[name].shown_by for name in names}
+    would = "; ".join(drives if len(alike) > 1 else alike)
     return (f"{enumerated(names, 'and')} explain the residual about equally well. Drives that would distinguish them: "
-            f"{'; '.join(drives)}. ridelog plan tells beforehand whether a drive would.")
+            f"{would}. ridelog plan tells beforehand whether a drive would.")
 
 
 def _on_the_way(found: LabDiagnosis) -> list[str]:

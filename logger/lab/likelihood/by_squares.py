@@ -2,7 +2,8 @@
 
 Problem: with a free noise level in each band (``whittle``) the likelihood of a model that is far off gains in one band
 what it loses in all others, and has optima all over the place. Solution: squares that weigh all bands alike have fewer;
-only from their minimum the likelihood goes on.
+only from their minimum the likelihood goes on. Their level is free, so that priors weigh as little as they do there:
+were the noise as large as all that was measured, a damper known to a factor of two would stay at what its file says.
 """
 
 from __future__ import annotations
@@ -16,6 +17,8 @@ from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import CONVERGED, optimise_numbers
 from logger.lab.likelihood.posterior import NotSimulated, Posterior, State
 from logger.lab.likelihood.repeats import repeat_each_other
+from logger.lab.likelihood.signals import JointWhitener
+from logger.lab.likelihood.whittle import Whitener
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.effect import Chosen
 from logger.vehicle.named_parameters import free_parameters_of
@@ -35,44 +38,51 @@ class BySquares:
         self.posterior = posterior if len(kept) == len(runs) else Posterior(
             SimulatedRuns([runs[one] for one in kept], posterior.runs.fine_hz), posterior.vehicle, posterior.tolerance,
             posterior.start_vehicle, posterior.prior, [posterior.readings[one] for one in kept])
-        self.whiteners = [bands.flat_whitener(np.concatenate([run.measured_mps2 * run.read, *run.more]))
-                          for bands, run in zip(self.posterior.bands, self.posterior.runs.runs, strict=True)]
-        self.freedom = self.posterior.freedom
+        self.whiteners = self._whiteners(1.0)
 
-    def squares(self, state: State) -> float:
-        """Sum of the squares of a state's residuals, weighed, and cost of its priors."""
-        return self.posterior.prior.cost(state.logs) + sum(float((whitener(one)**2).sum()) for whitener, one in zip(
-            self.whiteners, self.posterior.residuals(state), strict=True))
+    def _whiteners(self, noise: float) -> list[Whitener | JointWhitener]:
+        """For a noise that is such a share of what was measured."""
+        return [bands.flat_whitener(noise * np.concatenate([run.measured_mps2 * run.read, *run.more]))
+                for bands, run in zip(self.posterior.bands, self.posterior.runs.runs, strict=True)]
+
+    def _power(self, state: State) -> float:
+        """Mean square of a state's residuals over that of what was measured."""
+        return sum(float((whitener(one)**2).sum()) for whitener, one in zip(
+            self.whiteners, self.posterior.residuals(state), strict=True)) / self.posterior.freedom
+
+    def deviance(self, state: State) -> float:
+        """Minus twice the log of the likelihood of a state under white noise of any level, and cost of its priors."""
+        return float(self.posterior.freedom * np.log(self._power(state))) + self.posterior.prior.cost(state.logs)
 
     def at(self, effects: Sequence[Chosen], logs: Array, near: State) -> tuple[float, State] | None:
         """The state with these numbers and the records' errors of another state, of these runs or of all, and its
-        squares; None where it cannot be."""
+        deviance; None where it cannot be."""
         record = near.record if len(near.record) == len(self.kept) else [near.record[one] for one in self.kept]
         try:
             with np.errstate(all="ignore"):
                 state = self.posterior.state_at(effects, logs, record, near.size)
-                squares = self.squares(state)
+                deviance = self.deviance(state)
         except NotSimulated:
             return None
-        return (squares, state) if np.isfinite(squares) else None
+        return (deviance, state) if np.isfinite(deviance) else None
 
     def improved(self, start: State, rounds: int) -> tuple[float, State]:
-        """A state improved in so many rounds of steps, and its squares."""
-        least, best = self.squares(start), start
+        """A state improved in so many rounds of steps, and its deviance."""
+        least, best = self.deviance(start), start
         for _ in range(rounds):
             try:
                 with np.errstate(all="ignore"):
                     linear = LinearModel(self.posterior, best, self.posterior.number_slopes(
-                        best, self.posterior.prior.steps), self.whiteners)
+                        best, self.posterior.prior.steps), self._whiteners(float(np.sqrt(self._power(best)))))
                     found = optimise_numbers(linear, best, free_parameters_of(best.effects))
                     found = self.posterior.state_at(found.effects, found.logs, found.record, found.size)
-                    squares = self.squares(found)
+                    deviance = self.deviance(found)
             except NotSimulated:
                 break
-            if not squares < least:
+            if not deviance < least:
                 break
-            enough = squares > least * (1 - CONVERGED / self.freedom)
-            least, best = squares, found
+            enough = deviance > least - CONVERGED
+            least, best = deviance, found
             if enough:
                 break
         return least, best

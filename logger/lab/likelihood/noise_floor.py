@@ -152,17 +152,18 @@ def excess_over_noise(posterior: Posterior, state: State, chance: float) -> floa
     return max(excess_by_signal(posterior, state, chance).values())
 
 
-def excess_by_signal(posterior: Posterior, state: State, chance: float, noise: NoiseLevel | None = None
-                     ) -> dict[str, float]:
+def excess_by_signal(posterior: Posterior, state: State, chance: float, noise: NoiseLevel | None = None,
+                     sigma: float = UNUSUAL_SIGMA) -> dict[str, float]:
     """Share by which the residual is above what right models leave, by name of the signal (empty: the sensor's
     acceleration), of the run where it is largest. They leave the noise, what the model makes of the noise of its
     measured input, the discrepancy of two right simulations, and what is within the prior of calibrated sensors: as
-    large a share of what was measured as ``UNUSUAL_SIGMA`` deviations of the gain of the sensor, and of that which
+    large a share of what was measured as ``sigma`` deviations of the gain of the sensor, and of that which
     measured a rig's input. (Gains are fitted; how far a sensor is off a straight line, or its cross talk, are of that
     size at most.) A run so short that noise alone may do the same with this probability counts no higher than
     ``UNEXPLAINED``.
 
     noise    of the sensors, where it is known; None: estimated from the residuals
+    sigma    0: sensors are taken to be right but for their noise
     """
     from scipy.special import gammainccinv
 
@@ -175,7 +176,7 @@ def excess_by_signal(posterior: Posterior, state: State, chance: float, noise: N
                                                     inputs.residuals, strict=True):
             sensor = next((one for one in run.signals if one.name == signal.name), run.facts.main)
             of_input = posterior.tolerance.scale if run.timed else 0.0
-            chain = UNUSUAL_SIGMA * np.hypot(posterior.tolerance.gain_of(sensor), of_input) / DISCREPANCY
+            chain = sigma * np.hypot(posterior.tolerance.gain_of(sensor), of_input) / DISCREPANCY
             freedom = float(one.freedom.sum())
             expected = one.freedom @ (own.deviation_mps2**2 / share + (1 + chain**2) * one.floor + one.power(moved))
             above = float(np.sqrt(one.freedom @ one.levels(residual) / expected)) - 1

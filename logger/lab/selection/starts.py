@@ -81,14 +81,13 @@ class UnknownNumbers(MeasuredRoad):
             return local
         by_squares = self._by_squares(base.posterior)
         anchor = self._anchor(by_squares, base.state, 1)
-        without = by_squares.squares(anchor)
+        without = by_squares.deviance(anchor)
 
         def begun(one: Screened) -> Screened:
             found = self._begun(by_squares, one.effect, anchor, 1)
             if not found:
                 return one
-            gain = by_squares.freedom * float(np.log(without / by_squares.squares(found[0])))
-            return Started(one.effect, one.trials, anchor, gain)
+            return Started(one.effect, one.trials, anchor, without - by_squares.deviance(found[0]))
 
         return sorted(pool.map(begun, local), key=lambda one: -one.gain)
 
@@ -104,9 +103,9 @@ class UnknownNumbers(MeasuredRoad):
         ends = self._begun(by_squares, one.effect, one.anchor, self.starts)
         if not ends:
             return found
-        least = by_squares.squares(ends[0])
+        least = by_squares.deviance(ends[0])
         self.ends[one.effect.name] = sum(
-            by_squares.squares(end) < least * (1 + INDISTINGUISHABLE / by_squares.freedom) for end in ends), len(ends)
+            by_squares.deviance(end) < least + INDISTINGUISHABLE for end in ends), len(ends)
         found.append(CandidateFit.of(score, self._likeliest(
             by_squares.of_all(ends[0], base.state), base.posterior)))
         return sorted(found, key=lambda one: -one.gain)
@@ -138,7 +137,7 @@ class UnknownNumbers(MeasuredRoad):
         """The best car by squares with the effects of a state: from there, and from cars that are drawn."""
         here = by_squares.at(near.effects, near.logs, near)
         begun = [] if here is None else [by_squares.improved(here[1], 6)]
-        begun += [(by_squares.squares(one), one) for one in self._begun(by_squares, None, near, count)]
+        begun += [(by_squares.deviance(one), one) for one in self._begun(by_squares, None, near, count)]
         return min(begun, key=lambda pair: pair[0])[1]
 
     def _begun(self, by_squares: BySquares, effect: Effect | None, near: State, count: int, rounds: int = 12
