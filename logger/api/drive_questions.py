@@ -488,7 +488,7 @@ class RandomRoadQuestion(Question):
     gd_n0_cm3: Annotated[float | None, InPython(
         "degree of roughness Gd(n0), n0 = 0.1 cycles per metre [cm3]", ROUGHNESS)] = None
     iri_m_per_km: Annotated[float | None, Option(
-        "IRI; Gd(n0) follows from Eq 4.40, or for a waviness other than 2 from its own relation", IRI_RANGE,
+        "IRI; Gd(n0) follows from Eq 4.40", IRI_RANGE,
         "M_PER_KM")] = None
     length_m: Annotated[float, Option("[m]", LENGTH, "M")] = 1000.0
     spacing_m: Annotated[float, InPython("between samples [m]", SPACING)] = 0.05
