@@ -22,12 +22,14 @@ from logger.lab.likelihood.priors import CONFLICT_SIGMA, UNUSUAL_SIGMA, Toleranc
 from logger.runs import Run, normalised_rms_error
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.effect import Chosen
+from logger.vehicle.effects.sensor_gain import EFFECT as SENSOR_GAIN
 from logger.vehicle.vehicle import Vehicle
 
 Array = npt.NDArray[np.float64]
 
-POOR_ERROR = 0.8
-"""From this error on a model explains next to nothing: a third of the power (1 - 0.8 squared). A judgement."""
+POOR_ERROR, _GOOD_ERROR = 0.8, 0.35
+"""From the first error on a model explains next to nothing: a third of the power (1 - 0.8 squared), a judgement. Up to
+the second a car explains a record, or moves like it: nine tenths of the power (0.35 squared is 0.12)."""
 
 
 @dataclass(frozen=True)
@@ -47,12 +49,11 @@ class AnotherCar:
 
 
 def another_car(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen], predictions: Sequence[Array],
-                numbers: float, explains: float = 0.35, several: int = 4) -> AnotherCar | None:
+                numbers: float, several: int = 4) -> AnotherCar | None:
     """The other car that a record is of; None: it may be this one.
 
     predictions           of the model (n,) per run
     numbers               standard deviation of the car's numbers, as a share
-    explains              up to this error a car explains a record: nine tenths of the power (0.35 squared is 0.12)
     several               so many numbers that are unusually far off are another car's (a judgement: a missing effect
                           changes few numbers so far)
     """
@@ -73,21 +74,20 @@ def another_car(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen]
     logs = np.where(lengths, found.logs, found.logs - np.median(found.logs[~lengths]))
     far = [index for index in np.argsort(-np.abs(logs)) if not lengths[index]
            and abs(logs[index]) > UNUSUAL_SIGMA * numbers]
-    if found_error > explains or len(far) < several:
+    if found_error > _GOOD_ERROR or len(far) < several:
         return None
     return AnotherCar(some, error, found_error,
                       {wide.prior.names[index]: float(np.expm1(logs[index])) for index in far})
 
 
 def reading_gain(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen], predictions: Sequence[Array],
-                 tolerance: Tolerance, explains: float = 0.35, sensor: float = 5.0) -> float | None:
+                 tolerance: Tolerance) -> float | None:
     """How many times what rigs do was read: by the rig, of all that the tolerance allows, whose motion is likest to the
     readings, whatever their size. None: it may be theirs, as the model explains them, no such rig moves like them, or
-    the factor is a sensor's, or what the vehicle's masses and springs may be off by where a force was measured.
+    the factor is a sensor's, or of friction of a guide that nearly holds the rig, or what the vehicle's masses and
+    springs may be off by where a force was measured.
 
     predictions    of the model (n,) per run
-    explains       up to this error a rig moves like the readings; as of ``another_car``
-    sensor         up to this factor either way it may be one, or friction of a guide that nearly holds the rig
     """
     if normalised_rms_error(runs, predictions) < POOR_ERROR:
         return None
@@ -102,9 +102,10 @@ def reading_gain(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen
 
     logs = _cross_entropy_search(wide, effects, lambda predictions: gain_and_error(predictions)[1])
     gain, error = gain_and_error(wide.runs.predict(wide.car(effects, logs)))
+    sensor = SENSOR_GAIN.parameters[0]
     scale_std = wide.prior.scale_deviation if wide.shows_forces else 0.0
-    is_far = scale_std < 1 and abs(np.log(abs(gain))) > max(np.log(sensor), CONFLICT_SIGMA * scale_std)
-    return gain if error < explains and gain > 0 and is_far else None
+    is_far = scale_std < 1 and abs(np.log(abs(gain))) > max(np.log(sensor.high), CONFLICT_SIGMA * scale_std)
+    return gain if error < _GOOD_ERROR and gain > 0 and is_far else None
 
 
 def _first_part(run: Run, lasts_s: float = 25.0) -> Run:

@@ -365,11 +365,12 @@ def _fit_finely(search: Search, selection: Selection) -> tuple[Selection, Linear
 def _of_a_sensor(search: Search, selection: Selection, after: LinearModel) -> str | None:
     """Where something unknown is left, an effect of the sensor that explains less than half of what there is without
     it: whatever filters or shifts a record imitates a part of any motion. None: there is no such effect."""
-    if excess_over_noise(after.posterior, after.state, FALSE_ALARM) <= UNEXPLAINED:
+    named = [one.effect.name for one in selection.now.effects
+             if one.effect.name in selection.gains and isinstance(one.effect, SensorEffect)]
+    if not named or excess_over_noise(after.posterior, after.state, FALSE_ALARM) <= UNEXPLAINED:
         return None
-    named = [one.effect for one in selection.now.effects if one.effect.name in selection.gains]
-    return next((one.name for one in named if isinstance(one, SensorEffect)
-                 and not search.likelihood.explains_most(search.without(selection.now, one.name), selection.now)), None)
+    return next((name for name in named if not search.likelihood.explains_most(
+        search.without(selection.now, name), selection.now)), None)
 
 
 def _steps(selection: Selection, nominal_error: float) -> tuple[ErrorStep, ...]:

@@ -46,8 +46,6 @@ _SIZES = {"force": (("kN", 1e-3), ("kgf", 1 / STANDARD_GRAVITY_MPS2), ("lbf", 1 
           "acceleration": tuple((unit, size) for what, unit, size in _UNITS if what == _RECORD)}
 _KINDS = {"displacement": "length", "travel": "length"}
 _APART = 2.0  # kgf and lbf are
-_SENSOR_GAIN = (0.2, 5.0)
-"""Within these a factor may be a sensor's: the bounds of the effect ``sensor_gain``."""
 ANYWAY = "--anyway goes on"
 _NAMED = 4
 """Of the numbers of another car, so many are said."""
@@ -186,6 +184,8 @@ def _other_units(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
     """Which runs on roads, or profiles, are in another unit, the nearest one. A factor that a sensor's gain may be is a
     unit only if it is one, and all runs agree, and below the bounce the median of the runs as well: there the body
     moves with the road whatever is missing, but one run holds few such waves."""
+    from logger.vehicle.effects.sensor_gain import EFFECT as SENSOR_GAIN
+
     if not followed.pairs or followed.pairs[0][0].timed:
         return
     clear = [(run, around.gain, below.gain) for (run, _), around, below in
@@ -193,7 +193,7 @@ def _other_units(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
              if around.is_clear and run.facts.main.measures == "acceleration"]
     for run, gain, _ in clear:
         what, unit, size = min(_UNITS, key=lambda one: abs(log(gain / one[2])))
-        may_be_else = _SENSOR_GAIN[0] < gain < _SENSOR_GAIN[1]
+        may_be_else = SENSOR_GAIN.parameters[0].low < gain < SENSOR_GAIN.parameters[0].high
         gains = [*(around for _, around, _ in clear), median(below for _, _, below in clear)]
         if not may_be_else or all(abs(one / size - 1) < _NEAR for one in gains):
             yield (f"{run.name}: expected accelerations in m/s2 and elevations in m, found {gain:.3g} times what the "

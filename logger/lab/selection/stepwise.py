@@ -372,10 +372,10 @@ class Search(Generic[M, P, F]):
                 to_gain = max(to_gain, self._reached(now, tries))
             enough = effort.fit_share * to_gain
             tries += self._fit_all_roughly(pool, now.score, [
-                pair for pair in worth[1:] if pair[1].gain > enough or not pair[1].effect.reshapes], enough)
+                pair for pair in worth[1:] if _gains_enough(pair[1], enough)], enough)
             rough = _best_of_each(tries)
             enough = effort.refine_share * max([to_gain, *(one.gain for one in rough)])
-            best = {one.effect.name: one.gain for one in rough if one.gain > (enough if one.effect.reshapes else 0.0)}
+            best = {one.effect.name: one.gain for one in rough if _gains_enough(one, enough)}
             good = [one for one in sorted(tries, key=lambda one: -one.gain)
                     if one.gain > effort.tie_share * best.get(one.effect.name, np.inf)]
             if len(good) == 1 and instead_of is None and self.is_accepted(now, good[0]):
@@ -393,10 +393,8 @@ class Search(Generic[M, P, F]):
         return SearchRound(tuple(fits), tuple(one for one in unfitted if one.effect.name not in fitted))
 
     def _may_win(self, base: M, screened: Sequence[P], enough: float) -> list[tuple[M, P]]:
-        """The first of some screenings on a model that gain enough. What only shifts a run gains next to nothing to
-        first order where the distance errors have taken it."""
-        return [(base, one) for one in screened[: self.effort.fitted]
-                if one.gain > (enough if one.effect.reshapes else 0.0)]
+        """The first of some screenings on a model that gain enough."""
+        return [(base, one) for one in screened[: self.effort.fitted] if _gains_enough(one, enough)]
 
     def _screen_all(self, pool: ThreadPoolExecutor, base: M, effects: Sequence[Effect],
                     near: Chosen | None = None) -> list[P]:
@@ -551,6 +549,12 @@ def is_outside_data(posterior: Posterior, one: Chosen) -> bool:
 def names_of(model: FittedModel) -> list[str]:
     """Names of a model's effects."""
     return [one.effect.name for one in model.effects]
+
+
+def _gains_enough(one: Promise | Fitted, enough: float) -> bool:
+    """Whether an effect gains so much. What only shifts a run gains next to nothing to first order where the distance
+    errors have taken it."""
+    return one.gain > (enough if one.effect.reshapes else 0.0)
 
 
 def _best_of_each(fits: Sequence[F]) -> list[F]:
