@@ -12,11 +12,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.errors import BadInput
-
-Array = npt.NDArray[np.float64]
 
 MOST_SAMPLES = 10_000_000
 """28 hours at 100 Hz, 500 km of road at 0.05 m: 80 MB a column, so that a desk command stays below half a gigabyte."""

@@ -5,9 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from logger.arrays import Array
 
 MOST_POINTS = 4000
 CURVE_POINTS, CURVE_REACH = 201, 0.999

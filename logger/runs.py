@@ -6,15 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Bools
 from logger.dsp.whole_record import in_band
 from logger.left_out import LeftOut, counting
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
-
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 
 NO_READING, READING, CLIPPED = 0.0, 1.0, 2.0
 """What a sample may be: none, a reading, or one that only says that there was at least as much."""

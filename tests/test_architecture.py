@@ -27,7 +27,7 @@ READS_FOLDERS = "drivers.catalogue."
 OUTWARD = ("ridelog.", "logger.public.")
 """Names of the public package: as others know it, and by its folder in a repository."""
 FLOORS = (
-    "errors", "bounds", "units", "geodesy", "records", "chart_data", "printable", "left_out", "fitting",
+    "arrays", "errors", "bounds", "units", "geodesy", "records", "chart_data", "printable", "left_out", "fitting",
     "dsp", "comfort", "profiles", "runs", "vehicle", "roads", "estimation", "simulation", "identification", "modal",
     "lab", "extraction",
     "files", "shipped", "plugins", "installation", "store", "exchange", "studies", "service", "report", "fleet", "demo",
@@ -40,8 +40,8 @@ NUMERICAL = FLOORS[: FLOORS.index("extraction") + 1]
 """Floors of arrays and units: no files, no clocks, no processes."""
 OUTSIDE = {"os", "sys", "io", "pathlib", "time", "socket", "logging", "subprocess", "threading", "yaml", "drivers"}
 CARRIED = {
-    "errors", "bounds", "units", "geodesy", "records", "printable", "dsp", "comfort", "profiles", "runs", "vehicle",
-    "roads", "estimation", "files", "shipped", "plugins", "installation", "store", "service", "commands",
+    "arrays", "errors", "bounds", "units", "geodesy", "records", "printable", "dsp", "comfort", "profiles", "runs",
+    "vehicle", "roads", "estimation", "files", "shipped", "plugins", "installation", "store", "service", "commands",
 }
 """Floors that a car carries; every other floor is the desk's."""
 ON_BOARD = [name for name in SOURCES if name.startswith("logger.service.")] + [

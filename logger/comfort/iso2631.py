@@ -7,13 +7,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.bounds import time_hint
 from logger.dsp.filters import BlockFilter
 from logger.dsp.weightings.weighting import Weighting
-
-Floats = npt.NDArray[np.float64]
 
 # Table 2.5 (ISO 2631-1 Annex C.2.3): lower bounds [m/s2]. The ranges overlap on purpose; here the more severe word
 # holds wherever two would do.
@@ -36,17 +34,17 @@ HEALTH_FACTORS = (1.4, 1.4, 1.0)
 COMFORT_FACTORS = (1.0, 1.0, 1.0)
 
 
-def a_w(weighted_mps2: Floats) -> float:
+def a_w(weighted_mps2: Array) -> float:
     """R.m.s. of the weighted acceleration (n,), n > 0 [m/s2]. Eq 2.9; ISO 2631-1 clause 6.1."""
     return float(np.sqrt(np.mean(np.square(weighted_mps2))))
 
 
-def vdv(weighted_mps2: Floats, dt_s: float) -> float:
+def vdv(weighted_mps2: Array, dt_s: float) -> float:
     """Vibration dose value of weighted acceleration (n,) at steps of ``dt_s`` [m/s^1.75]. Eq 2.12; clause 6.3.2."""
     return float((np.sum(np.square(np.square(weighted_mps2))) * dt_s) ** 0.25)
 
 
-def crest_factor(weighted_mps2: Floats) -> float:
+def crest_factor(weighted_mps2: Array) -> float:
     """Largest weighted acceleration (n,) over its r.m.s.; nan when nothing moves. Clause 6.2.1.
 
     Up to CREST_LIMIT the r.m.s. says all; above, MTVV or VDV belongs beside it.
@@ -110,7 +108,7 @@ class AxisFigures:
         return tuple(name for name, needed in wanted.items() if needed)
 
 
-def axis_figures(weighted_mps2: Floats, rate_hz: float) -> AxisFigures:
+def axis_figures(weighted_mps2: Array, rate_hz: float) -> AxisFigures:
     """All figures of a weighted axis (n,), n > 0, sampled at ``rate_hz`` [Hz].
 
     Problem: one number cannot say both how a road shakes and how hard it hits. The standard has several, all from
@@ -137,7 +135,7 @@ class ExponentialRms:
         kept = math.exp(-1.0 / (rate_hz * tau_s))
         self._mean = BlockFilter([[1.0 - kept, 0.0, 0.0, 1.0, -kept, 0.0]])
 
-    def process(self, weighted_mps2: Floats) -> Floats:
+    def process(self, weighted_mps2: Array) -> Array:
         """Running r.m.s. at each of the next samples (n,) [m/s2]."""
         return np.sqrt(self._mean.process(np.square(weighted_mps2)))
 
@@ -164,7 +162,7 @@ class RunningRms:
         self._filled = 0
         self._sum = 0.0
 
-    def process(self, weighted_mps2: Floats) -> Floats:
+    def process(self, weighted_mps2: Array) -> Array:
         """Running r.m.s. at each of the next samples (n,) [m/s2]."""
         mean_square = np.empty(len(weighted_mps2))
         done = 0
@@ -282,8 +280,6 @@ def caution_zone(hours: float, exponent: int) -> CautionZone:
         return CautionZone(CAUTION_ZONE_VDV_MPS175.lower / per_mps2, CAUTION_ZONE_VDV_MPS175.upper / per_mps2)
     raise ValueError(f"the zone is drawn for exponents 2 and 4, not {exponent}")
 
-
-Array = npt.NDArray[np.float64]
 
 LOWEST_RATE_HZ = 80.0
 LEAST_TAKEN_HZ = 40.0  # Below, what a record shows ends within the 4 to 12.5 Hz that Wk counts most, or close above

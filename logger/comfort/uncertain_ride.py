@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from math import erf, exp, factorial, hypot, lgamma, nan, pi, sqrt
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from logger.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -9,11 +9,9 @@ motion as if all of them were negative, whatever else acts.
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Bools
 from logger.dsp.repeated_samples import stretches_of
-
-Array = npt.NDArray[np.float64]
 
 # So many equal samples are none by chance; the leap to them is so many of the steps that readings are written in: of a
 # curve that turns round within five samples and is rounded it is one.
@@ -64,7 +62,7 @@ def goes_against(force_n: Array, motion: Array, measured: int, orders: range, ra
     return bool(follows > _FOLLOWS and np.sum(parts[:, by < 0] ** 2) > _AGAINST * np.sum(parts**2))
 
 
-def _is_leapt_to(samples: Array, at: npt.NDArray[np.bool_]) -> bool:
+def _is_leapt_to(samples: Array, at: Bools) -> bool:
     """Whether a quarter of the long stretches in which a mask (n,) holds, or more, are come to, or left, in a leap."""
     leap = _LEAP_STEPS * _step(samples)
     change = np.abs(np.diff(samples, prepend=samples[:1], append=samples[-1:]))

@@ -27,7 +27,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.filters import Floats, butterworth_sos, frequency_response
+from logger.arrays import Array, Complex
+from logger.dsp.filters import butterworth_sos, frequency_response
 from logger.dsp.weightings.weighting import DELAY_SAMPLES, Sections, Weighting
 
 TOLERANCE_DB = 0.02
@@ -58,27 +59,27 @@ class DesignError:
 class _Quadratic:
     """A factor 1, z^-1, z^-2 of the cascade, written in two unconstrained numbers; sign -1 in the denominator."""
 
-    encode: Callable[[float, float], Floats]
+    encode: Callable[[float, float], Array]
     sign: int
 
 
-def _reflection(u: float, v: float) -> Floats:
+def _reflection(u: float, v: float) -> Array:
     """Every stable denominator, in the hyperbolic arguments of its reflection coefficients."""
     a2 = math.tanh(v)
     return np.array([1.0, (1.0 + a2) * math.tanh(u), a2])
 
 
-def _unit_gain(u: float, v: float) -> Floats:
+def _unit_gain(u: float, v: float) -> Array:
     """Every numerator that has gain 1 at 0 Hz."""
     return np.array([1.0 - u - v, u, v])
 
 
-def _resonance(period_s: float) -> Callable[[float, float], Floats]:
+def _resonance(period_s: float) -> Callable[[float, float], Array]:
     """The matched-z image of s^2 + 2 d w s + w^2, in log w and log d."""
 
     most_omega, most_damping = math.log(MOST_TURN_RAD / period_s), math.log(MOST_DAMPING_RATIO)
 
-    def encode(log_omega: float, log_damping: float) -> Floats:
+    def encode(log_omega: float, log_damping: float) -> Array:
         # Beyond these the factor is 1 at all frequencies; farther on its parts overflow.
         omega, damping = math.exp(min(log_omega, most_omega)), math.exp(min(log_damping, most_damping))
         turn = omega * period_s * np.sqrt(complex(1.0 - damping**2))
@@ -107,20 +108,20 @@ class _Fit:
         self.turn_per_sample = 2j * np.pi * f_hz * self.period_s
         self.quadratics: list[_Quadratic] = []
 
-    def coefficients(self, x: Floats) -> list[Floats]:
+    def coefficients(self, x: Array) -> list[Array]:
         return [q.encode(*x[2 * n : 2 * n + 2]) for n, q in enumerate(self.quadratics)]
 
-    def add(self, encode: Callable[[float, float], Floats], sign: int) -> None:
+    def add(self, encode: Callable[[float, float], Array], sign: int) -> None:
         self.quadratics.append(_Quadratic(encode, sign))
 
-    def misfit(self, x: Floats) -> npt.NDArray[np.complex128]:
+    def misfit(self, x: Array) -> Complex:
         """log of digital over analog, given the numbers of the quadratics, the log gain, and the delay in samples."""
         total = x[-2] - self.target + self.turn_per_sample * x[-1]
         for quadratic, q in zip(self.quadratics, self.coefficients(x), strict=True):
             total = total + quadratic.sign * np.log(q @ self.powers)
         return total.real + 1j * np.angle(np.exp(1j * total.imag))
 
-    def slopes(self, x: Floats) -> npt.NDArray[np.complex128]:
+    def slopes(self, x: Array) -> Complex:
         """Derivative of the misfit by every number, (frequencies, numbers)."""
         columns: list[npt.NDArray[Any]] = []
         small = 1e-6
@@ -132,13 +133,13 @@ class _Fit:
         columns += [np.ones(len(self.f_hz), dtype=np.complex128), self.turn_per_sample]
         return np.stack(columns, axis=1)
 
-    def solve(self, start: Floats, free_delay: bool) -> Floats:
+    def solve(self, start: Array, free_delay: bool) -> Array:
         from scipy.optimize import least_squares
 
         delay = [] if free_delay else [start[-1]]
         count = len(start) - len(delay)
 
-        def weighted(values: npt.NDArray[np.complex128]) -> Floats:
+        def weighted(values: Complex) -> Array:
             broad = (slice(None),) + (np.newaxis,) * (values.ndim - 1)
             return np.concatenate([self.magnitude_weight[broad] * values.real, self.phase_weight[broad] * values.imag])
 
@@ -155,7 +156,7 @@ class _Fit:
         )
         return np.append(found.x, delay)
 
-    def start_from_analog(self, low_pass_zero: float) -> Floats:
+    def start_from_analog(self, low_pass_zero: float) -> Array:
         """One denominator and one numerator for every analog factor but the high-pass."""
         resonance = _resonance(self.period_s)
         numbers: list[float] = []
@@ -180,7 +181,7 @@ class _Fit:
                 numbers += list(q[1:] / q.sum())
         return np.array([*numbers, 0.0, -0.5])
 
-    def with_all_pass(self, x: Floats) -> Floats:
+    def with_all_pass(self, x: Array) -> Array:
         """Put in the all-pass sections that carry the delay found free on to the whole samples promised."""
         from scipy.signal import tf2sos
 
@@ -195,13 +196,13 @@ class _Fit:
             numbers += list(numerator[1:] / numerator.sum())
         return np.array([*numbers, x[-2], float(DELAY_SAMPLES)])
 
-    def level(self, x: Floats) -> Floats:
+    def level(self, x: Array) -> Array:
         """The same numbers with the gain that suits them."""
         x[-2] -= np.median(self.misfit(x).real)
         return x
 
-    def rows(self, x: Floats) -> Floats:
-        sides: dict[int, list[Floats]] = {1: [], -1: []}
+    def rows(self, x: Array) -> Array:
+        sides: dict[int, list[Array]] = {1: [], -1: []}
         for quadratic, q in zip(self.quadratics, self.coefficients(x), strict=True):
             sides[quadratic.sign].append(q)
         sections = [np.concatenate(pair) for pair in zip(sides[1], sides[-1], strict=True)]
@@ -209,13 +210,13 @@ class _Fit:
         return np.vstack([self.high_pass, *sections])
 
 
-def _thiran(delay_samples: float, order: int) -> Floats:
+def _thiran(delay_samples: float, order: int) -> Array:
     """Denominator of the all-pass of maximally flat delay (Thiran), stable for delays above order - 1."""
     place = delay_samples - order + np.arange(order + 1)
     return np.array([(-1) ** k * math.comb(order, k) * np.prod(place / (place + k)) for k in range(order + 1)])
 
 
-def design_error(weighting: Weighting, sections: Sections, rate_hz: float, band_hz: Floats) -> DesignError:
+def design_error(weighting: Weighting, sections: Sections, rate_hz: float, band_hz: Array) -> DesignError:
     """Worst departure of ``sections`` from the formula at the frequencies ``band_hz`` [Hz], their delay taken out."""
     delay = np.exp(2j * np.pi * band_hz / rate_hz * DELAY_SAMPLES)
     ratio = frequency_response(sections, band_hz, rate_hz) * delay / weighting.response(band_hz)

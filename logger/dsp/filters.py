@@ -22,20 +22,21 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-Floats = npt.NDArray[np.float64]
-SectionRows = npt.NDArray[np.float64] | Sequence[Sequence[float]]
+from logger.arrays import Array, Complex
+
+SectionRows = Array | Sequence[Sequence[float]]
 
 BLOCK = 64
 
 
-def _checked_rows(sos: SectionRows) -> Floats:
+def _checked_rows(sos: SectionRows) -> Array:
     rows = np.asarray(sos, dtype=np.float64)
     if rows.ndim != 2 or rows.shape[1] != 6 or len(rows) == 0:
         raise ValueError(f"sections must be rows of 6 coefficients, not an array of shape {rows.shape}")
     return rows / rows[:, 3:4]
 
 
-def _state_space(rows: Floats) -> tuple[Floats, Floats, Floats, float]:
+def _state_space(rows: Array) -> tuple[Array, Array, Array, float]:
     """The cascade as x' = A x + B u, y = C x + D u; two states per section, transposed direct form II."""
     size = 2 * len(rows)
     A, B, C, D = np.zeros((size, size)), np.zeros(size), np.zeros(size), 1.0
@@ -51,7 +52,7 @@ def _state_space(rows: Floats) -> tuple[Floats, Floats, Floats, float]:
     return A, B, C, D
 
 
-def _block_step(A: Floats, B: Floats, C: Floats, D: float) -> Floats:
+def _block_step(A: Array, B: Array, C: Array, D: float) -> Array:
     """(BLOCK + n, BLOCK + n) matrix taking [inputs of a block, state] to [outputs of the block, next state]."""
     size = len(B)
     step = np.zeros((BLOCK + size, BLOCK + size))
@@ -90,7 +91,7 @@ class BlockFilter:
         self._inputs_state[:BLOCK] = 0.0
         self._inputs_state[BLOCK:] = rest
 
-    def process(self, x: Floats) -> Floats:
+    def process(self, x: Array) -> Array:
         """Filter the next samples, (n,) -> (n,), without delay; any split of a stream gives the same bits."""
         y = np.empty(len(x))
         done = 0
@@ -109,7 +110,7 @@ class BlockFilter:
         return y
 
 
-def frequency_response(sos: SectionRows, f_hz: npt.ArrayLike, fs_hz: float) -> npt.NDArray[np.complex128]:
+def frequency_response(sos: SectionRows, f_hz: npt.ArrayLike, fs_hz: float) -> Complex:
     """Complex response of the sections at the frequencies ``f_hz`` [Hz] when run at ``fs_hz`` [Hz]."""
     delay = np.exp(-2j * np.pi * np.asarray(f_hz, dtype=np.float64) / fs_hz)
     response = np.ones_like(delay)
@@ -118,7 +119,7 @@ def frequency_response(sos: SectionRows, f_hz: npt.ArrayLike, fs_hz: float) -> n
     return response
 
 
-def butterworth_sos(kind: Literal["low", "high"], cutoff_hz: float, fs_hz: float) -> Floats:
+def butterworth_sos(kind: Literal["low", "high"], cutoff_hz: float, fs_hz: float) -> Array:
     """One second-order Butterworth section, (1, 6), -3 dB exactly at ``cutoff_hz`` [Hz] for the rate ``fs_hz`` [Hz].
 
     Bilinear transform with prewarping (Oppenheim and Schafer, Discrete-Time Signal Processing, 7.2.2). Raises
@@ -137,8 +138,6 @@ def butterworth_sos(kind: Literal["low", "high"], cutoff_hz: float, fs_hz: float
         raise ValueError(f"a Butterworth section is 'low' or 'high', not {kind!r}")
     return np.array([[gain, middle * gain, gain, 1.0, a1, a2]])
 
-
-Complex = npt.NDArray[np.complex128]
 
 _NYQUIST = 0.4999
 
@@ -159,8 +158,6 @@ def butterworth(order: int, s: Complex, cutoff_hz: float, sampled_hz: float = 0.
         result = result / (1 + 2 * np.sin((2 * k - 1) * np.pi / (2 * order)) * x + x * x)
     return np.asarray(result)
 
-
-Array = npt.NDArray[np.float64]
 
 
 _SAMPLES_PER_PERIOD = 2.5

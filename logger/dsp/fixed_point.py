@@ -89,7 +89,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.dsp.filters import BlockFilter, Floats, SectionRows
+from logger.arrays import Array
+from logger.dsp.filters import BlockFilter, SectionRows
 from logger.units import STANDARD_GRAVITY_MPS2
 
 BLIND = 1e-12
@@ -98,12 +99,12 @@ _FLOOR = 1e-2
 _LONGEST = 1 << 14  # of responses for a choice; bounds are not taken from them
 
 
-def is_blind(b: Floats) -> bool:
+def is_blind(b: Array) -> bool:
     """Whether a numerator b0, b1, b2 lets nothing of a steady input through."""
     return bool(abs(b.sum()) < BLIND * np.abs(b).sum())
 
 
-def quiet(rows: Floats, impulse: Floats) -> Floats:
+def quiet(rows: Array, impulse: Array) -> Array:
     """The same cascade, (n, 6) rows with a0 = 1, in the pairing and order for integers; gains stay with the zeros.
 
     impulse    (m,) 1 and then zeros, long enough for the cascade to decay
@@ -113,7 +114,7 @@ def quiet(rows: Floats, impulse: Floats) -> Floats:
     return pairing[order]
 
 
-def _flattest(rows: Floats) -> Floats:
+def _flattest(rows: Array) -> Array:
     delay = np.exp(-1j * np.pi * (np.arange(_POINTS) + 0.5) / _POINTS)
     powers = np.array([np.ones_like(delay), delay, delay**2])
     zeros_gain, poles_gain = np.abs(rows[:, :3] @ powers), np.abs(rows[:, 3:] @ powers)
@@ -124,11 +125,11 @@ def _flattest(rows: Floats) -> Floats:
     return paired
 
 
-def _unevenness(gain: Floats) -> float:
+def _unevenness(gain: Array) -> float:
     return float(np.std(np.log(gain / gain.max() + _FLOOR)))
 
 
-def _order(rows: Floats, impulse: Floats) -> tuple[float, list[int]]:
+def _order(rows: Array, impulse: Array) -> tuple[float, list[int]]:
     """Noise of the best order [input steps squared, times 12], and the indices of the sections in it.
 
     Sets of sections are bit masks.
@@ -172,7 +173,7 @@ _MARGIN = 1.000001
 _SPARE = 0.999  # of the scale, for the rounding of the numerator
 
 # A disturbance: its largest value, and the impulse response (n,) from where it enters to the node looked at.
-_Path = tuple[float, Floats]
+_Path = tuple[float, Array]
 
 
 @dataclass(frozen=True)
@@ -244,20 +245,20 @@ def fixed_cascade(sos: SectionRows, full_scale: float, data_bits: int = 32) -> F
     return FixedCascade(tuple(sections), data_bits, float(input_step), float(input_step / total_gain), float(error_db))
 
 
-def _samples_until_forgotten(rows: Floats) -> int:
+def _samples_until_forgotten(rows: Array) -> int:
     slowest = max(np.abs(np.roots(row[3:])).max(initial=0.0) for row in rows)
     if slowest > _SLOWEST:
         raise ValueError(f"expected stable sections with poles within {_SLOWEST}, found one at {slowest:.9g}")
     return _SHORTEST + math.ceil(math.log(_FORGOTTEN) / math.log(max(slowest, _FORGOTTEN)))
 
 
-def _impulse(samples: int) -> Floats:
+def _impulse(samples: int) -> Array:
     impulse = np.zeros(samples)
     impulse[0] = 1.0
     return impulse
 
 
-def _fitted(row: Floats, paths: list[_Path], data_bits: int) -> tuple[float, FixedSection, list[_Path]]:
+def _fitted(row: Array, paths: list[_Path], data_bits: int) -> tuple[float, FixedSection, list[_Path]]:
     """One section at the finest scale that fits: the gain that takes it there, its integers, the paths to its output.
 
     What the input makes of the output and of the sum is proportional to the gain, so the gain follows at once.
@@ -284,7 +285,7 @@ def _fitted(row: Floats, paths: list[_Path], data_bits: int) -> tuple[float, Fix
     return gain, FixedSection(b, a, largest_output, largest_sum), reached
 
 
-def _numerator(b: Floats) -> tuple[int, int, int]:
+def _numerator(b: Array) -> tuple[int, int, int]:
     """b0, b1, b2 as integers. What is blind to a steady input stays so exactly: then b1 makes the sum 0."""
     b0, b1, b2 = (round(value * UNIT) for value in b.tolist())
     if is_blind(b):
@@ -292,7 +293,7 @@ def _numerator(b: Floats) -> tuple[int, int, int]:
     return b0, b1, b2
 
 
-def _denominator(a: Floats) -> tuple[int, int]:
+def _denominator(a: Array) -> tuple[int, int]:
     """a1, a2 as integers, still stable (the triangle |a1| < 1 + a2, a2 < 1)."""
     a1, a2 = (round(value * UNIT) for value in a.tolist())
     if not (a2 < UNIT and abs(a1) < UNIT + a2 and abs(a1) <= LARGEST_COEFFICIENT):
@@ -312,7 +313,7 @@ def _rounding(a: tuple[int, int], samples: int) -> list[_Path]:
     return [recursion, (0.5, impulse)]
 
 
-def _response(b: Iterable[float], a: tuple[int, int], x: Floats) -> Floats:
+def _response(b: Iterable[float], a: tuple[int, int], x: Array) -> Array:
     """What a section of coefficients times 2^30 makes of x."""
     return BlockFilter([[*b, UNIT, *a]]).process(x)
 
@@ -322,7 +323,7 @@ def _bound(paths: list[_Path]) -> float:
     return _MARGIN * sum(largest * float(np.abs(response).sum()) for largest, response in paths)
 
 
-def _energy_db(response: Floats) -> float:
+def _energy_db(response: Array) -> float:
     return 10.0 * math.log10(max(float(np.sum(response**2)), 1e-300))
 
 
@@ -354,11 +355,11 @@ class FixedFilter:
         for section in self._sections:
             x = section.reset(x)
 
-    def process(self, x: Floats) -> Floats:
+    def process(self, x: Array) -> Array:
         """Filter the next samples, (n,) -> (n,), in the units of the cascade's input and output."""
         return self.process_counts(self.counts(x)).astype(np.float64) * self._cascade.output_step
 
-    def counts(self, x: Floats) -> Integers:
+    def counts(self, x: Array) -> Integers:
         """Inputs (n,) as integers, clipped to full scale."""
         if np.isnan(x).any():
             raise ValueError("expected numbers, found a NaN")

@@ -9,7 +9,8 @@ from math import exp, log
 import numpy as np
 import numpy.typing as npt
 
-Bools = npt.NDArray[np.bool_]
+from logger.arrays import Array, Bools
+
 Places = npt.NDArray[np.int64]
 
 
@@ -25,8 +26,6 @@ def stretches_inside(mask: Bools) -> tuple[Places, Places]:
     inside = (first > 0) & (end < len(mask))
     return first[inside], end[inside]
 
-
-Array = npt.NDArray[np.float64]
 
 _WITHIN = 0.2  # of the mean step: so near to the one before only in a burst
 _SHARE = 0.3

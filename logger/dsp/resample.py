@@ -19,11 +19,10 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array, Bools
 from logger.dsp.filters import kaiser_half_length, low_pass_taps
 from logger.units import US_PER_S
 
-Floats = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 Times = npt.NDArray[np.int64]
 
 NODES = 8
@@ -48,12 +47,12 @@ class GridRun:
 
     t0_us: int
     rate_hz: int
-    values: Floats
-    nearest: Floats
+    values: Array
+    nearest: Array
     clipped: Bools
     bridged: Bools
     new_start: bool
-    each: Floats | None = None
+    each: Array | None = None
     each_clipped: Bools | None = None
 
 
@@ -62,7 +61,7 @@ class _Readings:
     """Readings not yet done with, arrays (n,)."""
 
     t_us: Times
-    values: Floats
+    values: Array
     clipped: Bools
 
     def __len__(self) -> int:
@@ -111,7 +110,7 @@ class GridResampler:
         """The readings lie so far apart [s] when none is missing; None: a step of the grid, as at the start."""
         self._spacing_us = self._step_us if spacing_s is None else spacing_s * US_PER_S
 
-    def push(self, t_us: Times, values: Floats, clipped: Bools) -> list[GridRun]:
+    def push(self, t_us: Times, values: Array, clipped: Bools) -> list[GridRun]:
         """More readings, arrays (n,) with times [us]; gives the runs that have become certain."""
         new = _Readings(t_us, values, clipped).part(self._keep(t_us))
         if not len(new):
@@ -190,7 +189,7 @@ class GridResampler:
         return GridRun(int(grid_us[0]), self._rate_hz, values, readings[nearest], clipped, bridged, new_start)
 
 
-def _lagrange(t_us: Times, values: Floats, at_us: Times) -> Floats:
+def _lagrange(t_us: Times, values: Array, at_us: Times) -> Array:
     """Polynomial through ``values`` at ``t_us``, both (nodes, n), taken at ``at_us`` (n,).
 
     A weight is the product of (t_j - at) / (t_j - t_i) over the other nodes j, so on a node it is exactly 1 or 0.
@@ -216,7 +215,7 @@ BLOCK = 16
 BRIDGED_SHARE = 0.5
 
 
-def decimation_taps(factor: int) -> Floats:
+def decimation_taps(factor: int) -> Array:
     """Linear-phase low-pass for thinning ``factor`` x 100 Hz to 100 Hz: a sinc in a Kaiser window, (2 h + 1,).
 
     Passes 0-38 Hz within 0.01 dB and stops what would fold into that band, from 62 Hz up, by 64 dB; half the
@@ -284,7 +283,7 @@ class Decimator:
         self._each = np.zeros((2, 0))
         self._next_us, self._new_start = run.t0_us, True
 
-    def _advance(self, values: Floats, marks: Bools, own: Floats) -> list[GridRun]:
+    def _advance(self, values: Array, marks: Bools, own: Array) -> list[GridRun]:
         self._marks = np.concatenate([self._marks, marks], axis=1)
         self._each = np.concatenate([self._each, own], axis=1)
         pieces = []
@@ -306,7 +305,7 @@ class Decimator:
                 self._given = 0
         return [self._run(np.concatenate(pieces))] if pieces else []
 
-    def _run(self, values: Floats) -> GridRun:
+    def _run(self, values: Array) -> GridRun:
         used = len(values) * self._factor
         shares = self._marks[:, :used].reshape(2, len(values), self._factor).mean(axis=2)
         clipped, bridged = shares[0] > 0.0, shares[1] >= BRIDGED_SHARE
@@ -318,7 +317,5 @@ class Decimator:
         self._new_start = False
         return run
 
-
-Array = npt.NDArray[np.float64]
 
 

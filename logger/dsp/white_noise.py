@@ -13,9 +13,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from logger.arrays import Array, Complex
 
 _BANDS, _LEAST_BANDS = 32, 16
 """Of so many bands at least so many are equally loud where they are noise. Half: the spectrum of a random walk, as of a
@@ -83,6 +82,6 @@ def without_white_noise(samples: Array) -> Denoised:
     return Denoised(line + kept, deviation, left)
 
 
-def _spectrum(samples: Array) -> npt.NDArray[np.complex128]:
+def _spectrum(samples: Array) -> Complex:
     """Spectrum (n,) of samples that go on oddly at both ends."""
     return np.fft.rfft(np.concatenate([samples, -samples[-2:0:-1]]))

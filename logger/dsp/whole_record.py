@@ -32,9 +32,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array, Complex
 from logger.dsp.filters import kaiser_half_length, kaiser_window, low_pass_taps
-
-Array = npt.NDArray[np.float64]
 
 _REACH = 12  # grid steps on either side
 _STOP_DB = 70.0
@@ -199,6 +198,6 @@ def _low_passed(samples: Array, cutoff_hz: float, half_width_hz: float, rate_hz:
 
 
 @lru_cache(maxsize=32)  # records of one length pass the same filter hundreds of times
-def _gain(half: int, cutoff: float, size: int) -> npt.NDArray[np.complex128]:
+def _gain(half: int, cutoff: float, size: int) -> Complex:
     """Transform of the taps of a low-pass, the first at 0, over so many samples."""
     return np.fft.rfft(low_pass_taps(half, 1, cutoff, _BAND_STOP_DB), size)

@@ -16,12 +16,10 @@ from math import nan, sqrt
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array, Bools
 from logger.units import US_PER_S
 
 GOOD_SHARE = 0.8
-
-Floats = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -39,17 +37,17 @@ class GridSamples:
     """
 
     t_us: npt.NDArray[np.int64]
-    reading_mps2: Floats
-    accel_mps2: Floats
-    weighted_mps2: Floats
-    running_rms_mps2: Floats
+    reading_mps2: Array
+    accel_mps2: Array
+    weighted_mps2: Array
+    running_rms_mps2: Array
     present: Bools
     interpolated: Bools
     settled: Bools
     clipped: Bools
-    each_mps2: Floats
+    each_mps2: Array
     each_usable: Bools
-    each_at_end: Floats
+    each_at_end: Array
 
     def __len__(self) -> int:
         return len(self.t_us)
@@ -117,7 +115,7 @@ class _Open:
         self.largest = np.zeros(2)
         self.stood = False
 
-    def add(self, part: GridSamples, speed_mps: Floats, bridged: Bools) -> None:
+    def add(self, part: GridSamples, speed_mps: Array, bridged: Bools) -> None:
         """Sum more samples of this window."""
         good = part.present & part.settled
         weighted = part.weighted_mps2[good]
@@ -203,7 +201,7 @@ class WindowCutter:
         return self._open.t_us, start_m if start_m is not None else float("-inf")
 
     def push_known(
-        self, samples: GridSamples, distance_m: Floats, speed_mps: Floats, bridged: Bools, leg: int
+        self, samples: GridSamples, distance_m: Array, speed_mps: Array, bridged: Bools, leg: int
     ) -> list[Window]:
         """Samples of one leg, each with its travelled distance [m] and speed [m/s]."""
         finished = self._enter((False, leg))

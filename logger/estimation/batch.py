@@ -28,8 +28,8 @@ from math import ceil, exp, isfinite, sqrt
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Bools
 from logger.bounds import time_hint
 from logger.estimation.error_bound import ErrorBound, pooled_r2
 from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM, RoadSpectrum
@@ -43,9 +43,6 @@ from logger.vehicle.effect import Chosen, RoadEffect
 from logger.vehicle.linearise import KnownCar, known_car
 from logger.vehicle.uncertain import NumberErrors, cars_off
 from logger.vehicle.vehicle import GENERIC, Vehicle
-
-Array = npt.NDArray[np.float64]
-Mask = npt.NDArray[np.bool_]
 
 LEVEL_REACH_M = 50.0
 """A window's road is as rough as the mean of the windows so far to both sides."""
@@ -204,7 +201,7 @@ class Score:
     within_two: float
 
 
-def score(windows: Windows, exact: Array, which: Mask) -> Score | None:
+def score(windows: Windows, exact: Array, which: Bools) -> Score | None:
     """For windows that are marked (n,), answered and have an exact IRI (n,); None when these do not differ."""
     known = which & np.isfinite(windows.iri_m_per_km) & np.isfinite(exact)
     error, truth = (windows.iri_m_per_km - exact)[known], exact[known]
@@ -468,14 +465,14 @@ def _driven(track: Track, vehicle: Vehicle) -> Array:
     return track.elevation_m.mean(axis=1) if vehicle.model == "full_car" else track.elevation_m[:, 0]
 
 
-def speed_classes(windows: Windows) -> Iterator[tuple[float, Mask]]:
+def speed_classes(windows: Windows) -> Iterator[tuple[float, Bools]]:
     """The lower end of each class of speed that was driven [m/s], and which windows (w,) are in it."""
     number = np.floor(windows.speed_mps / SPEED_CLASS_MPS + _NEARLY).astype(int)
     for one in np.unique(number).tolist():
         yield one * SPEED_CLASS_MPS, number == one
 
 
-def figures(found: Assessment, which: Mask) -> dict[str, Any]:
+def figures(found: Assessment, which: Bools) -> dict[str, Any]:
     """Figures of the windows that are marked (w,): named, SI units in the names; those that are not known are left
     out."""
     windows = found.windows

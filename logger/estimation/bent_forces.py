@@ -13,16 +13,13 @@ from __future__ import annotations
 from math import sqrt
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Complex
 from logger.estimation.car_response import HIGHEST_HZ, WAVE_NUMBER_STEPS_CPM, WAVE_NUMBERS_CPM
 from logger.estimation.time_grid import frequencies_hz
 from logger.vehicle.laws import CornerLaws
 from logger.vehicle.linear_car import CornerSlopes, LinearCar
 from logger.vehicle.linearise import MovedCar
-
-Array = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 _AT, _SHARE = np.polynomial.hermite_e.hermegauss(9)
 _SHARE = _SHARE / _SHARE.sum()
@@ -60,7 +57,7 @@ class BentForces:
                         for one in (waves.travel, waves.rate, waves.own_rate)]
         self._count = count
 
-    def reading(self, under: ComplexArray, psd_m3: Array, resolved: Array) -> tuple[Array, float]:
+    def reading(self, under: Complex, psd_m3: Array, resolved: Array) -> tuple[Array, float]:
         """What the forces beyond the linear ones do to the reading (count,) [m/s2], and the variance of what they may
         do besides, because the motion is not known exactly [(m/s2)2].
 

@@ -9,17 +9,14 @@ from functools import cached_property, lru_cache
 from math import exp, log
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Complex
 from logger.estimation.road_spectrum import RoadSpectrum, log_waves
 from logger.estimation.time_grid import frequencies_hz
 from logger.roads.iri import STANDARD_SPEED_MPS, TIRE_BASE_M
 from logger.vehicle.linear_car import LinearCar, frequency_response
 from logger.vehicle.models import GOLDEN_CAR, quarter_car
 from logger.vehicle.structure import suspension_travel
-
-Array = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 HIGHEST_HZ = 42.0  # recorders pass less from here on
 _SPEEDS_PER_E = 20  # speeds within 2.5 % share one power response
@@ -47,11 +44,11 @@ class CarResponse:
         self._off = tuple(off)
         self._powers: dict[int, Array] = {}
         self._apart: tuple[float, Array] | None = None
-        self._changes: dict[int, ComplexArray] = {}
+        self._changes: dict[int, Complex] = {}
         self.behind_m, self._axle = np.unique(car.structure.behind_m, return_inverse=True)
         self.contact_patch_m = car.structure.contact_patch_m
 
-    def by_axle(self, f_hz: Array) -> ComplexArray:
+    def by_axle(self, f_hz: Array) -> Complex:
         """Reading per elevation under each axle, (x, f) [1/s2]; nothing at 0 Hz and above what recorders pass."""
         seen = (f_hz > 0) & (f_hz <= HIGHEST_HZ)
         by_wheel = self._car.by_wheel(f_hz[seen])
@@ -101,7 +98,7 @@ class CarResponse:
         """Whether nothing is known of how far its numbers may be off."""
         return not self._off
 
-    def changes(self, speed_mps: float) -> ComplexArray:
+    def changes(self, speed_mps: float) -> Complex:
         """What the gain from road to reading, at ``WAVE_NUMBERS_CPM``, changes by for each of the cars that it may be
         instead, as a share of its own (o, n). Where the gain is nothing that may be any number; speeds as ``power``."""
         key = round(log(speed_mps) * _SPEEDS_PER_E)
@@ -133,7 +130,7 @@ class _Axles:
         self._shift = (np.exp(-2j * np.pi * behind_m[:, None] * WAVE_NUMBERS_CPM)
                        * np.sinc(WAVE_NUMBERS_CPM * structure.contact_patch_m))
 
-    def gain(self, f_hz: Array) -> ComplexArray:
+    def gain(self, f_hz: Array) -> Complex:
         """From the road under the front axle to the reading (n,) [1/s2], ``f_hz`` (n,) at ``WAVE_NUMBERS_CPM``."""
         at = np.log(f_hz)
         looked_up = [np.interp(at, _LOG_TABLE_HZ, one) for one in self._by_axle]
@@ -189,12 +186,12 @@ def steady_motion(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, ra
 
 
 @lru_cache(maxsize=32)
-def golden_car_on_grid(count: int, spacing_m: float) -> ComplexArray:
+def golden_car_on_grid(count: int, spacing_m: float) -> Complex:
     """``golden_car_slope`` for the rfft of ``count`` elevations at this spacing [m]; kept, for there are few counts."""
     return golden_car_slope(np.asarray(np.fft.rfftfreq(count, spacing_m), dtype=np.float64))
 
 
-def golden_car_slope(wave_number_cpm: Array) -> ComplexArray:
+def golden_car_slope(wave_number_cpm: Array) -> Complex:
     """Slope between body and wheel of the Golden Car per elevation [1/m], with its tire's 250 mm average.
 
     As in the exact filter (``logger.roads.iri``) the average reaches ahead of where the value counts.

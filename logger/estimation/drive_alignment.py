@@ -15,8 +15,8 @@ from dataclasses import dataclass
 from math import degrees, hypot, radians
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.estimation.receiver_delay import (
     BLOCK_S,
     DELAYS_S,
@@ -28,8 +28,6 @@ from logger.estimation.receiver_delay import (
     forward_of,
     with_block,
 )
-
-Array = npt.NDArray[np.float64]
 
 WAIT_S = 5.0
 PART_BLOCKS = 6

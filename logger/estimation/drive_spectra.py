@@ -23,8 +23,7 @@ from zlib import compress, decompressobj, error
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
+from logger.arrays import Array, Bools
 
 BLOCK_S = 4.0
 """Bodies bounce at 1 to 2 Hz with 0.2 of critical damping and more: half a hertz of resolution (1.5 / BLOCK_S) shows

@@ -27,8 +27,8 @@ from dataclasses import dataclass
 from math import ceil, pi, sqrt
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.estimation.car_response import HIGHEST_HZ, WAVE_NUMBERS_CPM, golden_car_slope
 from logger.estimation.iri_posterior import reading_noise_psd
 from logger.estimation.road_spectrum import RoadSpectrum
@@ -37,8 +37,6 @@ from logger.estimation.time_grid import RATE_HZ
 from logger.roads.iri import PER_KM
 from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.linearise import KnownCar
-
-Array = npt.NDArray[np.float64]
 
 _SPACING_M = 0.05
 _FORGOTTEN_M = 400.0  # the slope has no memory of what lies so far behind

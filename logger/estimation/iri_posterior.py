@@ -14,8 +14,8 @@ from functools import lru_cache
 from math import pi, sqrt
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Complex
 from logger.estimation.car_response import (
     LOG_WAVES,
     WAVE_NUMBER_STEPS_CPM,
@@ -27,8 +27,6 @@ from logger.estimation.normal_distribution import mean_absolute, variance_of_mea
 from logger.estimation.road_solver import quick_fft_length
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.roads.iri import PER_KM
-
-Array = npt.NDArray[np.float64]
 
 _SLOPE_POWER = np.abs(golden_car_slope(WAVE_NUMBERS_CPM)) ** 2 * WAVE_NUMBER_STEPS_CPM
 _NODES = np.array([-sqrt(3), 0.0, sqrt(3)])  # Gauss-Hermite, in standard errors of the log level
@@ -215,6 +213,6 @@ def _memory(spacing_m: float) -> Array:
 
 
 @lru_cache(maxsize=32)
-def _memory_waves(spacing_m: float, length: int) -> npt.NDArray[np.complex128]:
+def _memory_waves(spacing_m: float, length: int) -> Complex:
     """Its rfft over so many points; kept, for there are few such numbers."""
     return np.asarray(np.fft.rfft(_memory(spacing_m), length))

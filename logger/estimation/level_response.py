@@ -16,14 +16,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Complex
 from logger.estimation.quantisation import GaussianReadings
 from logger.estimation.road_solver import Block
 from logger.estimation.roughness import resolved_shares
-
-Array = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 RISE = 0.4  # of the log level, by 22 % of an IRI: about a standard error of it where steps hide a road
 _FOLLOWED_SAMPLES = 600  # the newest, whose bounds have gone through fewer than four blocks
@@ -38,7 +35,7 @@ class Answer:
     what ``RoadLevels.learn`` was told."""
 
     readings: GaussianReadings
-    waves: ComplexArray
+    waves: Complex
     innovations: Array
     log_variance: Array
     gain: Array
@@ -61,7 +58,7 @@ class LevelResponse:
 
     def __init__(self) -> None:
         self._precision = self._pull = np.zeros(0)
-        self._road: tuple[Block, ComplexArray] | None = None
+        self._road: tuple[Block, Complex] | None = None
         self._curvatures = np.zeros(2)
         self.curvature = 1.0
 
@@ -82,7 +79,7 @@ class LevelResponse:
         precision = before + share * self._precision
         return GaussianReadings((readings.value_mps2 * before + share * self._pull) / precision, 1 / precision)
 
-    def waves_at(self, block: Block, waves: ComplexArray, rise: Array) -> ComplexArray:
+    def waves_at(self, block: Block, waves: Complex, rise: Array) -> Complex:
         """The road's innovations likewise, for points (n,) of the block."""
         if self._road is None:
             return waves

@@ -14,12 +14,9 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Complex
 from logger.estimation.car_response import HIGHEST_HZ, SteadyMotion
-
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 
 _BAND_HZ = 0.25
 _LOWEST_HZ = 2.0  # below, drift and braking are no road's either
@@ -67,7 +64,7 @@ class OtherMotion:
         gain = np.sqrt(self.psd * self._rate_hz / 2)
         count, mean_weight = len(weight), float(weight.mean())
 
-        def weighed(row: Array) -> npt.NDArray[np.complex128]:
+        def weighed(row: Array) -> Complex:
             return gain * np.fft.rfft(weight * row)
 
         waves = np.zeros(len(gain), dtype=np.complex128)

@@ -18,13 +18,11 @@ from dataclasses import dataclass
 from math import log
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.estimation.car_response import SteadyMotion
 from logger.estimation.normal_distribution import within
 from logger.estimation.sensor_noise import Sensor
-
-Array = npt.NDArray[np.float64]
 
 _KEPT = 0.3  # of the last round, so that rounds do not overshoot
 _TRIALS = 12

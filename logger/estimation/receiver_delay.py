@@ -40,9 +40,9 @@ from itertools import product
 from math import hypot, sqrt
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from logger.arrays import Array
+
 Strength = tuple[float, float, float, float]
 Rows = tuple[Array, Array, Array]
 

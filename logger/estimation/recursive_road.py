@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 from math import exp, log, pi
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Bools, Complex
 from logger.estimation.car_response import SteadyMotion, steady_motion
 from logger.estimation.iri_posterior import vehicle_error_variance
 from logger.estimation.level_response import RISE, Answer, LevelResponse
@@ -43,10 +43,6 @@ from logger.estimation.sensor_noise import (
     with_noise,
 )
 from logger.estimation.time_grid import RATE_HZ, RoadSamples, between
-
-Array = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
-Bools = npt.NDArray[np.bool_]
 
 _STEPS = 8
 _FIRST_STEPS = 24
@@ -84,7 +80,7 @@ class SolvedBlock:
     other_psd    (f,) spectrum of what else moves it, one-sided, at the block's frequencies [(m/s2)2/Hz]; None: nothing
     """
 
-    road: ComplexArray
+    road: Complex
     accel_mps2: Array
     variance: Array
     seen: Array
@@ -127,7 +123,7 @@ class FollowedRoad:
         self._centre_mps2, self._accel_variance = 0.0, 0.0
         self._like_noise = 0.0
         self._other.restart()
-        self._solved_last: tuple[Block, ComplexArray] | None = None
+        self._solved_last: tuple[Block, Complex] | None = None
         self._roughness = RoadLevels(self._spacing_m)
         self._response = LevelResponse()
         if self._is_coarse:

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 from math import exp, hypot, sqrt
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Bools, Complex
 from logger.comfort.uncertain_ride import (
     PowerSum,
     RideSums,
@@ -27,10 +27,6 @@ from logger.estimation.car_response import LOG_WAVES, WAVE_NUMBERS_CPM, CarRespo
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.time_grid import frequencies_hz
-
-Array = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
-Bools = npt.NDArray[np.bool_]
 
 _LINES = 1024  # of time that spectra are taken over: ten seconds at 100 Hz, finer than the axles' comb in them
 _LAGS_S = 1.0
@@ -97,7 +93,7 @@ class RidePosterior:
     response    of the weighting at frequencies (n,) [Hz]
     """
 
-    def __init__(self, response: Callable[[Array], ComplexArray], count: int, rate_hz: float) -> None:
+    def __init__(self, response: Callable[[Array], Complex], count: int, rate_hz: float) -> None:
         self._rate_hz = rate_hz
         self._count = count
         self._response = response(frequencies_hz(count, rate_hz))

@@ -33,6 +33,7 @@ from typing import overload
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array, Complex
 from logger.dsp.filters import frequency_response
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.estimation.road_spectrum import COMMON_ROAD
@@ -41,8 +42,6 @@ from logger.roads.iri import PER_KM, golden_car_sections
 from logger.units import MPH_MPS, WINDOW_M
 from logger.vehicle.linearise import KnownCar
 from logger.vehicle.vehicle import Vehicle, with_load
-
-Array = npt.NDArray[np.float64]
 
 SPEEDS_MPS = tuple(mph * MPH_MPS for mph in range(10, 71, 10))
 LEVELS_IRI = tuple(float(iri) for iri in range(1, 11))  # the roads of 6.4 [m/km]
@@ -183,7 +182,7 @@ def fit(x: Array, y: Array, level: Array) -> RmsLine:
 def _responses(
     car: KnownCar, recorder_gain: Callable[[Array], Array] | None, wave_number: Array, speeds_mps: tuple[float, ...],
     level_m_per_km: float,
-) -> npt.NDArray[np.complex128]:
+) -> Complex:
     """Recorded acceleration, and the same weighted with Wk, per elevation (2, speeds, waves), on roads of this IRI. No
     delay of filters."""
     speeds = np.array(speeds_mps)[:, None]
@@ -218,7 +217,7 @@ class _Roads:
         self._slope = _golden_car_response(self.wave_number, spacing_m)
         self._random = np.random.default_rng(settings.seed)
 
-    def drive(self, number: int, responses: npt.NDArray[np.complex128]) -> tuple[Array, Array, Array]:
+    def drive(self, number: int, responses: Complex) -> tuple[Array, Array, Array]:
         """Of the next road, per window: IRI (windows,) [m/km], mean square acceleration and mean square weighted
         acceleration (speeds, windows) [m2/s4]."""
         parts = self._random.standard_normal((2, len(self._waves)))
@@ -227,7 +226,7 @@ class _Roads:
         accel, weighted = self._in_windows(np.square(self._along(road * responses)))
         return iri, accel, weighted
 
-    def _along(self, waves: npt.NDArray[np.complex128]) -> Array:
+    def _along(self, waves: Complex) -> Array:
         """Sum of waves (..., waves) at every sample of the road (..., samples)."""
         spectrum = np.zeros((*waves.shape[:-1], self._samples // 2 + 1), dtype=complex)
         spectrum[..., self._waves] = waves * (self._samples / 2)
@@ -237,7 +236,7 @@ class _Roads:
         return values.reshape(*values.shape[:-1], self._windows, -1).mean(axis=-1)
 
 
-def _golden_car_response(wave_number: Array, spacing_m: float) -> npt.NDArray[np.complex128]:
+def _golden_car_response(wave_number: Array, spacing_m: float) -> Complex:
     """Slope of the suspension per elevation [1/m] of the IRI's car on a profile of samples: see ``rectified_slope``."""
     base_m = _TIRE_SAMPLES * spacing_m
     slope = (np.exp(2j * np.pi * wave_number * base_m) - 1) / base_m

@@ -25,14 +25,11 @@ from functools import lru_cache
 from math import pi
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Bools, Complex
 from logger.estimation.car_response import HIGHEST_HZ, WAVE_NUMBERS_CPM, CarResponse
 from logger.estimation.road_spectrum import RoadSpectrum, log_waves
 from logger.estimation.time_grid import at_readings, frequencies_hz
-
-Array = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
 
 ENTRY_S = 2.5
 UNSEEN_M = 60.0
@@ -58,8 +55,8 @@ class Solution:
     gain         (k,) information over prior of each wave where D is 1; the readings resolve g / (1 + g) of its variance
     """
 
-    waves: ComplexArray
-    road: ComplexArray
+    waves: Complex
+    road: Complex
     innovations: Array
     fitted_mps2: Array
     drift_mps2: Array
@@ -142,7 +139,7 @@ class Block:
         spectrum: RoadSpectrum,
         relative_variance: Array,
         steps: int,
-        start: ComplexArray | None = None,
+        start: Complex | None = None,
     ) -> Solution:
         """The most probable road.
 
@@ -164,20 +161,20 @@ class Block:
             result: Array = weight * row - (inner @ (weighted @ row)) @ weighted
             return result
 
-        def seen_as(waves: ComplexArray) -> tuple[Array, Array]:
+        def seen_as(waves: Complex) -> tuple[Array, Array]:
             """Innovations point by point, and the readings of the car on them."""
             np.multiply(waves, shaped, out=pair[0])
             pair[1] = waves
             elevation, white = np.fft.irfft(pair, self.count)
             return white, self._read(self._under(elevation))
 
-        def brought_back(weighed: Array, unlikely: Array) -> tuple[ComplexArray, ComplexArray]:
+        def brought_back(weighed: Array, unlikely: Array) -> tuple[Complex, Complex]:
             """A row in time under the car's transpose, and one on the distance grid, as waves of the innovations."""
             scattered, held = np.fft.rfft(np.stack([self._scattered(weighed), unlikely]))
             return np.conj(shaped) * scattered, held
 
         if start is None:
-            waves: ComplexArray = np.zeros(len(factor), np.complex128)
+            waves: Complex = np.zeros(len(factor), np.complex128)
             white, explained = np.zeros(self.count), np.zeros(len(weight))
         else:
             waves = start * (factor != 0)
@@ -212,7 +209,7 @@ class Block:
         drift_variance = np.einsum("ij,ij->j", inner @ self._grid.drift, self._grid.drift)
         return Solution(waves, waves * factor, white, explained + drift, drift, drift_variance, gain)
 
-    def carried_over(self, earlier: Block, waves: ComplexArray) -> ComplexArray:
+    def carried_over(self, earlier: Block, waves: Complex) -> Complex:
         """``waves`` of an earlier block on the same spacing as they lie in this one; road that is new is still flat.
 
         Innovations are local, so they can be cut and shifted where elevations would get an edge.
@@ -224,11 +221,11 @@ class Block:
         kept = white[behind: min(earlier.count, behind + self.count)] if behind >= 0 else white[:0]
         return np.fft.rfft(kept, self.count)
 
-    def same_road(self, waves: ComplexArray, old: RoadSpectrum, new: RoadSpectrum) -> ComplexArray:
+    def same_road(self, waves: Complex, old: RoadSpectrum, new: RoadSpectrum) -> Complex:
         """``waves`` found with one spectrum as they are with another, for the same road."""
         return waves * np.sqrt(old.psd_of(self.log_waves) / new.psd_of(self.log_waves))
 
-    def wave_factors(self, spectrum: RoadSpectrum) -> ComplexArray:
+    def wave_factors(self, spectrum: RoadSpectrum) -> Complex:
         """F: from white innovations to elevations [m]; 0 for the mean and for waves that the time grid cannot hold.
 
         A quarter of a wave behind, as an integral is: where the waviness is 2, innovations are the road's slope, so
@@ -236,7 +233,7 @@ class Block:
         """
         psd = spectrum.psd_of(self.log_waves)
         psd[(self.wave_number_cpm == 0) | (self.wave_number_cpm > self._highest_cpm)] = 0.0
-        factor: ComplexArray = -1j * np.sqrt(psd / (2 * self.spacing_m))
+        factor: Complex = -1j * np.sqrt(psd / (2 * self.spacing_m))
         factor[-1] = 0.0  # the shortest wave of the grid has no quarter
         return factor
 
@@ -251,7 +248,7 @@ class Block:
         gain: Array = np.interp(self._waves.log_n, _LOG_WAVE_NUMBERS, np.sqrt(total), right=0.0) ** 2
         return gain / max(self.seen_points(weight > 0), 1)
 
-    def seen(self, read: npt.NDArray[np.bool_]) -> Array:
+    def seen(self, read: Bools) -> Array:
         """(count,) 1 where the front wheel passed a point of the distance grid while there were readings, else 0."""
         first, reach = self._front[read], np.maximum(self._advance, 1)[read]
         begins, ends = (np.bincount(at, minlength=self.count + 1)
@@ -259,7 +256,7 @@ class Block:
         result: Array = (np.cumsum(begins - ends)[:-1] > 0).astype(np.float64)
         return result
 
-    def seen_points(self, read: npt.NDArray[np.bool_]) -> int:
+    def seen_points(self, read: Bools) -> int:
         """How many points of the distance grid the car passed while there were readings."""
         return int(self._advance @ read)
 
@@ -288,25 +285,25 @@ class Block:
         """Sum (t,) of a row (y,) over the readings of each sample."""
         return row.reshape(-1, self._grid.reads).sum(axis=1)
 
-    def driven(self, road: ComplexArray) -> Array:
+    def driven(self, road: Complex) -> Array:
         """A r: the readings (y,) [m/s2] of the car on a road, which is given by the rfft of its elevations [m]."""
         return self._read(self.under(road))
 
-    def under(self, road: ComplexArray) -> ComplexArray:
+    def under(self, road: Complex) -> Complex:
         """The rfft in time of the elevations under the axles (x, f) [m], contact patch and all, of such a road."""
         return self._under(np.fft.irfft(road * self._averaged, self.count))
 
-    def transposed(self, row: Array) -> ComplexArray:
+    def transposed(self, row: Array) -> Complex:
         """A' times a row (y,) in time, as an rfft."""
         return np.fft.rfft(self._scattered(row)) * self._averaged
 
-    def _read(self, under: ComplexArray) -> Array:
+    def _read(self, under: Complex) -> Array:
         first, *others = under * self._grid.by_axle
         for one in others:
             first += one
         return at_readings(first, len(self._front), self._grid.reads)
 
-    def _under(self, elevation: Array) -> ComplexArray:
+    def _under(self, elevation: Array) -> Complex:
         low, high = elevation.take(self._points) * self._shares
         return np.fft.rfft(low + high)
 
@@ -355,7 +352,7 @@ def patch_gain(wave_number_cpm: Array, contact_patch_m: float, spacing_m: float)
     return np.asarray(np.sinc(wave_number_cpm * contact_patch_m) / np.sinc(wave_number_cpm * spacing_m) ** 2)
 
 
-def _product(one: ComplexArray, other: ComplexArray) -> float:
+def _product(one: Complex, other: Complex) -> float:
     """Scalar product of two real rows of even length given by their rfft, times that length."""
     both = 2 * np.vdot(one, other).real
     return float(both - (one[0] * other[0]).real - (one[-1] * other[-1]).real)

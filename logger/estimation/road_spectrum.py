@@ -11,11 +11,9 @@ from dataclasses import dataclass
 from math import exp, log
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.roads.iso8608 import CM3_M3, REFERENCE_N0_CPM, gd_n0_from_iri
-
-Array = npt.NDArray[np.float64]
 
 PIVOT_CPM = 0.2
 """Where a level is counted: in the middle of the waves that shake a car."""

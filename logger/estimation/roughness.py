@@ -26,9 +26,8 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from logger.arrays import Array, Bools, Complex
 
 LENGTHS_M = np.array([10.0, 100.0, 10_000.0])
 # Of the log variance, before a road is known: half of all roads between 1.1 and 5.7 m/km make the last.
@@ -267,7 +266,7 @@ class RoadLevels:
         self._log_variances[_LEARNT] = np.clip(logs + np.clip(step, -_LARGEST_STEP, _LARGEST_STEP),
                                                np.log(_LEAST_VARIANCE), np.log(_LARGEST_VARIANCE))
 
-    def _learn_scatter(self, power: Array, weight: Array, gain: Array, inside: npt.NDArray[np.bool_]) -> None:
+    def _learn_scatter(self, power: Array, weight: Array, gain: Array, inside: Bools) -> None:
         """By how much the local means of a block scatter more than chance makes them: their variance less that of a
         weighted sum of squares of what has the correlation that the resolved shares give it (Isserlis)."""
         count = len(power)
@@ -301,7 +300,7 @@ def resolved_shares(strength: Array, gain: Array, seen: Array, free: float | Non
 
 
 @lru_cache(maxsize=32)
-def _neighbours(count: int, reach: float) -> npt.NDArray[np.complex128]:
+def _neighbours(count: int, reach: float) -> Complex:
     """The rfft of how much each neighbour of a point counts, on a grid of so many; kept, for there are few counts."""
     lag = np.minimum(np.arange(count), count - np.arange(count))
     return np.asarray(np.fft.rfft(np.exp(-0.5 * (lag / reach) ** 2)))

@@ -26,11 +26,9 @@ from dataclasses import dataclass
 from math import exp, hypot, log, sqrt
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.estimation.normal_distribution import probability_between
-
-Array = npt.NDArray[np.float64]
 
 NOISE_MPS2 = 0.05
 """Of a reading, where nobody says another [m/s2]; where it is to be learnt, a guess to begin with."""

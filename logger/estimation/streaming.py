@@ -14,8 +14,8 @@ from functools import reduce
 from math import ceil, hypot, nan, sqrt
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Bools, Complex
 from logger.comfort.uncertain_ride import NO_FIGURES, RideFigures, RideSums
 from logger.estimation.bent_forces import BentForces
 from logger.estimation.car_response import LOG_WAVES, WAVE_NUMBERS_CPM, CarResponse, golden_car_on_grid
@@ -36,10 +36,6 @@ from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.estimation.time_grid import RATE_HZ, RoadSamples, between
 from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.linearise import KnownCar, MovedCar
-
-Array = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
-Bools = npt.NDArray[np.bool_]
 
 BLOCK_SAMPLES = 2048
 HOP_SAMPLES = 200
@@ -150,7 +146,7 @@ class RoadEstimator:
         on_road: Callable[[RoadPiece], None] | None = None,
         late_std_s: float = 0.0,
         noise: NoiseBelief | None = None,
-        ride_response: Callable[[Array], ComplexArray] | None = None,
+        ride_response: Callable[[Array], Complex] | None = None,
         ride_ahead_m: float = 0.0,
         off: Sequence[KnownCar] = (),
         is_measured: bool = True,

@@ -10,11 +10,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-ComplexArray = npt.NDArray[np.complex128]
-Bools = npt.NDArray[np.bool_]
+from logger.arrays import Array, Bools, Complex
 
 RATE_HZ = 100.0
 SLOWEST_MPS = 1.0
@@ -73,7 +70,7 @@ def between(row: Array, reads: int) -> Array:
     return row if reads == 1 else at_readings(np.fft.rfft(row), len(row), reads)
 
 
-def at_readings(waves: ComplexArray, count: int, reads: int) -> Array:
+def at_readings(waves: Complex, count: int, reads: int) -> Array:
     """The same from its rfft."""
     return np.fft.irfft(waves, count * reads) * reads
 

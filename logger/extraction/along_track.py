@@ -9,13 +9,12 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.dsp.repeated_samples import stretches_of
 from logger.geodesy import EARTH_RADIUS_M
 from logger.lab.likelihood.lag import SLOWEST_MPS, lags, offset_by_correlation_m
 from logger.profiles.track import Track
 from logger.runs import RECEIVER_ERROR_LASTS_S, Run
-
-Array = npt.NDArray[np.float64]
 
 ASIDE_M = 25.0
 """No receiver with a fix is farther off among houses, but for moments; a parallel street is."""

@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array, Bools
 from logger.bounds import FASTEST_HZ
 from logger.dsp.repeated_samples import (
     burst_ends,
@@ -37,9 +38,6 @@ from logger.dsp.whole_record import mean_rate_hz, on_even_grid
 from logger.estimation.drive_alignment import MOVED_DEG, angle_rad, has_moved, sitting
 from logger.geodesy import EARTH_RADIUS_M
 from logger.units import STANDARD_GRAVITY_MPS2
-
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 
 LONGEST_HOLE_S = 0.5
 """Over a shorter hole readings lie on a straight line: the filters of the service run on over so much as well."""

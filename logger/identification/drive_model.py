@@ -32,6 +32,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array, Complex
 from logger.identification.unknown_inputs import (
     SPEED_SCALE,
     Obstacle,
@@ -54,9 +55,6 @@ from logger.vehicle.named_parameters import AXLES, BOTH, Free, changed, free_par
 from logger.vehicle.simulate import FINE_RATE_HZ, finer, recorder_gain, recorder_taps, smooth_length
 from logger.vehicle.structure import Structure
 from logger.vehicle.vehicle import Vehicle
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 # The car has come to the first sample as fast as it goes there for so long [s].
 _APPROACH_S = 3.0

@@ -19,12 +19,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.errors import CheckFailed
 from logger.vehicle.named_parameters import WEAKEST
-
-Array = npt.NDArray[np.float64]
 
 SILENT, TOGETHER, WEAK, UNEXPLAINED = "silent", "together", "weak", "unexplained"
 TURNED, APART = "turned", "apart"

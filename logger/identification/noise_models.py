@@ -24,12 +24,10 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.dsp.filters import DecimatingLowPass
 from logger.dsp.linear_prediction import PredictionWhitener, burg, ladder, levinson
-
-Array = npt.NDArray[np.float64]
 
 LEAST_SHARE = 1e-5
 """Noise is never taken for less than this share of the measurement: predictions are not more accurate themselves, and

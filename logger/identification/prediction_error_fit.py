@@ -20,8 +20,8 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.dsp.filters import DecimatingLowPass
 from logger.fitting.levenberg_marquardt import Minimum, minimise
 from logger.identification.identifiability import (
@@ -43,8 +43,6 @@ from logger.identification.noise_models import (
 )
 from logger.runs import normalised_rms
 from logger.vehicle.named_parameters import Coordinates, Free
-
-Array = npt.NDArray[np.float64]
 
 _LONGEST_STEP = 1.0
 # Converged: what is left of the way is this share of a standard error; of a model that is stepped through time, this.

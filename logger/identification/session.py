@@ -16,8 +16,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.dsp.filters import DecimatingLowPass
 from logger.dsp.repeated_samples import find_repeats
 from logger.identification.drive_model import DriveModel, SimulatedModel, VehicleModel
@@ -30,8 +30,6 @@ from logger.runs import READING, SENSOR, Run, normalised_rms
 from logger.vehicle.effect import Chosen
 from logger.vehicle.named_parameters import Free
 from logger.vehicle.vehicle import OWN_NAMES, Vehicle
-
-Array = npt.NDArray[np.float64]
 
 # Places are so much of a bump's width apart, and so many seconds of the way at most.
 _OF_WIDTH, _OF_TIME_S = 0.15, 0.05

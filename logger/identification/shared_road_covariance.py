@@ -19,8 +19,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Complex
 from logger.identification.drive_model import DriveModel
 from logger.identification.noise_models import ROAD_LEVEL, PredictionWhitener
 from logger.identification.prediction_error_fit import Fit
@@ -28,9 +28,6 @@ from logger.profiles.track import Track
 from logger.roads.iso8608 import displacement_psd
 from logger.vehicle.named_parameters import Coordinates
 from logger.vehicle.simulate import recorder_gain
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 _MOST_SAMPLES, _BEFORE_SAMPLES = 1500, 300
 _GRID_STEP_M, _GRID_SAMPLES = 0.02, 32_768

@@ -21,8 +21,8 @@ from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, partial
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Bools
 from logger.estimation.car_response import (
     HIGHEST_HZ,
     WAVE_NUMBER_STEPS_CPM,
@@ -36,8 +36,6 @@ from logger.vehicle.models import half_car
 from logger.vehicle.published_cars import NUMBERS, CarPrior, car_of, published_prior, share_of
 from logger.vehicle.structure import body_point
 from logger.vehicle.vehicle import SensorPlace, Vehicle
-
-Array = npt.NDArray[np.float64]
 
 WAVINESS, WAVINESS_APART, WAVINESS_WITHIN = 2.0, 0.3, 0.2
 """Of roads: mean, deviation from stretch to stretch, and from block to block within one. ISO 8608 has 2 for all; the
@@ -280,7 +278,7 @@ class UnknownCar:
         known = 0.5 * float(np.linalg.slogdet(self.knowledge.precision)[1]) - self.stretches * np.log(WAVINESS_APART)
         return LearnedCar(self.knowledge, x, step.covariance, roads, value + known + step.log_volume, converged)
 
-    def is_impulsive(self, x: Array) -> npt.NDArray[np.bool_]:
+    def is_impulsive(self, x: Array) -> Bools:
         """Blocks (b,) in whose spectrum a car with these coordinates shows a pothole, a joint or a kerb.
 
         Problem: a road of random waves has a spectrum that is a power of the wave number; a short hole adds one that is

@@ -24,11 +24,9 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.vehicle.named_parameters import WEAKEST, Free
-
-Array = npt.NDArray[np.float64]
 
 # A shorter patch is taken for one of this length, and over a shorter step the mean is that of its ends [m].
 _LEAST_PATCH_M = 1e-3

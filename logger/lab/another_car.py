@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.lab.likelihood.map_fit import align, fit
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import CONFLICT_SIGMA, UNUSUAL_SIGMA, Tolerance
@@ -24,8 +24,6 @@ from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.effect import Chosen
 from logger.vehicle.effects.sensor_gain import EFFECT as SENSOR_GAIN
 from logger.vehicle.vehicle import Vehicle
-
-Array = npt.NDArray[np.float64]
 
 POOR_ERROR, _GOOD_ERROR = 0.8, 0.35
 """From the first error on a model explains next to nothing: a third of the power (1 - 0.8 squared), a judgement. Up to

@@ -13,8 +13,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.lab.likelihood.map_fit import fit_model
 from logger.lab.likelihood.noise_floor import floor_error, sensor_noise_with_rounding
 from logger.lab.likelihood.posterior import Posterior
@@ -33,8 +33,6 @@ from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import Car, Response, compose
 from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,8 +17,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.identification.drive_model import DriveModel
 from logger.identification.prediction_error_fit import Fit, FitOptions
 from logger.identification.session import fit_down_to_0, upright_fit
@@ -28,7 +28,6 @@ from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.readings import Readings
 from logger.runs import Run, normalised_rms
 
-Array = npt.NDArray[np.float64]
 ModelOf = Callable[[list[Run]], DriveModel]
 
 

@@ -14,13 +14,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Complex
 from logger.lab.likelihood.whittle import Bands
 from logger.lab.selection.evidence import FALSE_ALARM
 from logger.runs import Run
-
-Array = npt.NDArray[np.float64]
 
 _MOST_LAG_S = 1.0
 """The right road correlates within this lag: a late clock, or a place that is metres off. A judgement."""
@@ -174,7 +172,7 @@ def better_placement(run: Run, predict: Callable[[Array, bool], Array], band_hz:
     return best if best.match.is_clear and not best.match.is_upside_down else None
 
 
-def _spectrum(samples: Array, rate_hz: float, band_hz: tuple[float, float]) -> npt.NDArray[np.complex128]:
+def _spectrum(samples: Array, rate_hz: float, band_hz: tuple[float, float]) -> Complex:
     """Spectrum of samples (n,), padded to twice their number, 0 outside of a band."""
     padded = 2 * len(samples)
     spectrum = np.fft.rfft(samples - samples.mean(), padded)

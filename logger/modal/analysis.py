@@ -19,11 +19,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Complex
 from logger.modal import subspace
 from logger.modal.decay import decay_modes, proposals
-from logger.modal.mode import Array, ModalResult, OrderPoles, best_size, generous_size, judge, order_poles
+from logger.modal.mode import ModalResult, OrderPoles, best_size, generous_size, judge, order_poles
 from logger.modal.subspace import Moments, jackknife, segment_products
 
 METHODS = {
@@ -94,7 +94,7 @@ def find_modes(samples: Array, rate_hz: float, inputs: Array | None = None, deca
     return ModalResult(tuple(modes), tuple(rejected), chosen, how, tuple(diagram))
 
 
-def _no_surer_than_the_record(covariance: Array, poles: npt.NDArray[np.complex128], duration_s: float) -> Array:
+def _no_surer_than_the_record(covariance: Array, poles: Complex, duration_s: float) -> Array:
     """Covariance (n, 2, 2) whose variances are at least what random shaking of this length can show of a pole.
 
     The envelope of a mode that is shaken by white noise is a complex Ornstein-Uhlenbeck process; over a time T its

@@ -32,11 +32,9 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Bools, Complex
 from logger.modal.mode import (
-    Array,
-    Complex,
     FoundMode,
     ModalResult,
     OrderPoles,
@@ -242,7 +240,7 @@ def _take_in(fit: _Fit, samples: Array, diagram: tuple[OrderPoles, ...], rate_hz
     return believed
 
 
-def _bounded(poles: Complex, duration_s: float) -> npt.NDArray[np.bool_]:
+def _bounded(poles: Complex, duration_s: float) -> Bools:
     """Which poles grow little enough, if at all, to be those of a record of this duration."""
     least_damping, most_growth = -0.05, 10.0  # the latter in powers of e, from the first sample to the last
     return np.asarray((damping_ratio(poles) > least_damping) & (poles.real * duration_s < most_growth))

@@ -25,6 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array, Bools
 from logger.fitting.information_matrix import integrated_out
 from logger.fitting.levenberg_marquardt import minimise
 from logger.modal.mode import LARGEST_DAMPING_ERROR, LARGEST_FREQUENCY_ERROR, FoundMode, ModalResult, Rejected
@@ -36,8 +37,6 @@ from logger.vehicle.modes import vibrating
 from logger.vehicle.named_parameters import AXLES, changed, free, read
 from logger.vehicle.named_parameters import names as names_of
 from logger.vehicle.vehicle import Vehicle
-
-Array = npt.NDArray[np.float64]
 
 _PIECE_S = 10.0
 _KERNEL = 6  # half bins to each side that a Hann taper mixes
@@ -68,7 +67,7 @@ class Periodograms:
     worth: Array
 
 
-def pieces_of(samples: Array, speed_mps: Array, usable: npt.NDArray[np.bool_], rate_hz: float) -> Periodograms:
+def pieces_of(samples: Array, speed_mps: Array, usable: Bools, rate_hz: float) -> Periodograms:
     """Cut a record (n,) into tapered pieces that overlap by half, of which each has readings, and moves, all along.
 
     ValueError for fewer than four.
@@ -266,7 +265,7 @@ def _modes(vehicle: Vehicle) -> Array:
     return np.array([(one.frequency_hz, one.damping_ratio) for one in vibrating(modes_of(structure_of(vehicle)))])
 
 
-def car_modes(vehicle: Vehicle, samples: Array, speed_mps: Array, usable: npt.NDArray[np.bool_], rate_hz: float
+def car_modes(vehicle: Vehicle, samples: Array, speed_mps: Array, usable: Bools, rate_hz: float
               ) -> ModalResult:
     """The modes of a vehicle near this one, out of its reading (n,) on roads that nobody measured.
 

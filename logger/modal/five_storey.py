@@ -22,8 +22,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from logger.arrays import Array, Complex
 from logger.modal.decay import Decrement, log_decrement
-from logger.modal.mode import Array, Complex
 from logger.units import STANDARD_GRAVITY_MPS2
 from logger.vehicle.structure import driven_outputs, matrix_exponential, recursion, straight_step
 

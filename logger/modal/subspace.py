@@ -35,7 +35,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.modal.mode import Array, Complex, OrderPoles
+from logger.arrays import Array, Complex
+from logger.modal.mode import OrderPoles
 
 Estimate = Callable[["Moments"], OrderPoles]
 

@@ -14,15 +14,13 @@ from functools import cached_property
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.dsp.white_noise import Denoised, without_white_noise
 from logger.profiles.track import Alterations, Stance, Way
 
 if TYPE_CHECKING:
     from scipy.interpolate import BSpline
-
-Array = npt.NDArray[np.float64]
 
 _CUBIC = 3
 FEWEST = _CUBIC + 1  # Samples that an excitation has at least

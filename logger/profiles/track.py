@@ -19,7 +19,7 @@ from typing import ClassVar, Protocol
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from logger.arrays import Array
 
 # A patch shorter than this is a point: averages over less would drown in rounding, and no profile is so fine.
 _POINT_M = 1e-4

@@ -39,6 +39,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.roads.iri import iri, slope_gain
 from logger.roads.iso8608 import (
     CLASS_GD_N0_CM3,
@@ -50,8 +51,6 @@ from logger.roads.iso8608 import (
     displacement_psd,
     road_class,
 )
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

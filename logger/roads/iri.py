@@ -17,6 +17,7 @@ from math import ceil, floor
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.dsp.filters import BlockFilter
 from logger.dsp.fixed_point import FixedFilter
 from logger.roads.iso8608 import CLASS_GD_N0_CM3, iri_from_gd_n0
@@ -24,8 +25,6 @@ from logger.units import FOOT_M, INCH_PER_MILE_M_PER_KM, KMH_MPS, KNOT_MPS, MILE
 from logger.vehicle.linear_car import frequency_response
 from logger.vehicle.models import GOLDEN_CAR, quarter_car
 from logger.vehicle.structure import suspension_travel
-
-Array = npt.NDArray[np.float64]
 
 STANDARD_SPEED_MPS = 80 * KMH_MPS
 START_M = 11.0

@@ -17,7 +17,7 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from logger.arrays import Array
 
 REFERENCE_N0_CPM = 0.1
 LOWEST_CPM = 0.011

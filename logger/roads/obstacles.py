@@ -11,8 +11,10 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array
 
-def speed_bump(distance_m: npt.ArrayLike, start_m: float, height_m: float, width_m: float) -> npt.NDArray[np.float64]:
+
+def speed_bump(distance_m: npt.ArrayLike, start_m: float, height_m: float, width_m: float) -> Array:
     """Elevation of a speed bump at the given distances [m], zero outside of it.
 
     One whole period of a raised cosine (Eq 4.41 of Blum 2015 with time written as distance over speed, Eq 4.42).
@@ -24,8 +26,6 @@ def speed_bump(distance_m: npt.ArrayLike, start_m: float, height_m: float, width
     inside = (along >= 0) & (along < 1)
     return np.where(inside, 0.5 * height_m * (1 - np.cos(2 * np.pi * along)), 0.0)
 
-
-Array = npt.NDArray[np.float64]
 
 
 def step(distance_m: npt.ArrayLike, start_m: float, height_m: float) -> Array:

@@ -19,9 +19,9 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array, Bools
 from logger.roads.sections import WindowErrors, errors_of_means
 
-Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.intp]
 
 _CELLS = 1 << 20
@@ -64,7 +64,7 @@ class Passes:
         """Of each, without what is common to all [(m/km)2]."""
         return self.iri_errors.std**2 - self.iri_errors.parts()[1] ** 2
 
-    def of(self, which: npt.NDArray[np.bool_]) -> Passes:
+    def of(self, which: Bools) -> Passes:
         """Some of them, as marked (p,)."""
         return Passes(self.key[which], self.drive[which], self.time_s[which], self.iri_m_per_km[which],
                       self.iri_errors.of(np.flatnonzero(which)), self.known_m[which])
@@ -337,7 +337,7 @@ def _confidence(value: Array, std: Array, limit: float) -> Array:
     return np.where(known, ndtr(z), 0.0)
 
 
-def _rows(mean: Means, which: npt.NDArray[np.bool_]) -> list[npt.NDArray[np.intp]]:
+def _rows(mean: Means, which: Bools) -> list[npt.NDArray[np.intp]]:
     """Cells that are chosen, in rows of neighbours on one way."""
     chosen = np.flatnonzero(which)
     if not len(chosen):

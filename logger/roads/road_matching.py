@@ -26,9 +26,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array, Bools
 from logger.geodesy import EARTH_RADIUS_M
 
-Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.intp]
 
 SEARCH_M = 25.0
@@ -321,7 +321,7 @@ def match(network: RoadNetwork, trace: Trace, receiver: Receiver = USUAL, start:
                    np.where(on, aside_m, np.nan)), (end_e, end_n, end_ee, end_en, end_nn)
 
 
-def _too_far(way: Ints, aside_m: Array, receiver: Receiver) -> npt.NDArray[np.bool_]:
+def _too_far(way: Ints, aside_m: Array, receiver: Receiver) -> Bools:
     """Windows of stretches on one way that lie further aside on the mean than the difference of two errors should."""
     believed = 2.0  # standard deviations that a stretch may lie aside of its way
     stretch = np.cumsum(np.diff(way, prepend=way[:1]) != 0)

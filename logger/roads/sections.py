@@ -37,9 +37,9 @@ from math import log, pi
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.units import INCH_PER_MILE_M_PER_KM
 
-Array = npt.NDArray[np.float64]
 Ints = npt.NDArray[np.intp]
 
 ALONG_M = 30.0

@@ -20,8 +20,9 @@ from typing import Any
 import numpy as np
 
 from drivers.readings import AccelerationBlock, Fix
+from logger.arrays import Array
 from logger.comfort.uncertain_ride import NO_FIGURES
-from logger.dsp.windows import Floats, GridSamples, Window, WindowCutter, joined, runs_of_equal
+from logger.dsp.windows import GridSamples, Window, WindowCutter, joined, runs_of_equal
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.drive_spectra import DRIVE_SPECTRA, SpectraKeeper
 from logger.estimation.rms_calibration import RmsRelation
@@ -54,7 +55,7 @@ class RoughnessQueue:
         self._leg: int | None = None
         self._expected = -1
 
-    def read(self, samples: GridSamples, distance_m: Floats, leg: int) -> None:
+    def read(self, samples: GridSamples, distance_m: Array, leg: int) -> None:
         """Samples of one leg with their travelled distance [m]; the leg before has ended (``end_leg``)."""
         if leg != self._leg:
             self._leg, self._expected = leg, -1

@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track, WheelTracks
 from logger.roads.obstacles import OBSTACLES
@@ -21,8 +21,6 @@ from logger.vehicle.modes import modes, undamped_frequencies_hz, vibrating
 from logger.vehicle.simulate import FINE_RATE_HZ, Passage
 from logger.vehicle.structure import Output, body_point, corner_of, suspension_travel, wheel
 from logger.vehicle.vehicle import Vehicle
-
-Array = npt.NDArray[np.float64]
 
 _MOST_TRIES = 200
 _NEARLY_M = 1e-9

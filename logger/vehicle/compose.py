@@ -15,8 +15,8 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Complex
 from logger.vehicle.effect import (
     ActuatorEffect,
     BodyEffect,
@@ -45,9 +45,6 @@ from logger.vehicle.structure import (
     straight_step,
 )
 from logger.vehicle.vehicle import Axle, Vehicle
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 MOST_MPS2 = 1e6
 """Records end here: those of a car whose motion grows without bound, which effects may make."""

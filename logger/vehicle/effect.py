@@ -30,14 +30,11 @@ from types import MappingProxyType, SimpleNamespace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Complex
 from logger.vehicle.laws import CornerLaws
 from logger.vehicle.structure import Structure
 from logger.vehicle.vehicle import OWN_NAMES, Vehicle
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 _AT_BOUND = 1e-3
 ON_A_RIG = "it needs a road and a speed, and the run is driven by time"

@@ -18,9 +18,9 @@ from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from logger.arrays import Array
+
 Law = Callable[[Array], Array]
 Law2 = Callable[[Array, Array], Array]
 

@@ -22,6 +22,7 @@ from functools import cached_property
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array, Complex
 from logger.vehicle.effect import Chosen, SensorEffect
 from logger.vehicle.laws import Between
 from logger.vehicle.models import structure_of
@@ -29,9 +30,6 @@ from logger.vehicle.named_parameters import Free, changed, read
 from logger.vehicle.simulate import recorder_gain
 from logger.vehicle.structure import Output, Structure, body_point
 from logger.vehicle.vehicle import Vehicle
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 # Step of the differences that derivatives of matrices (exact: they are quadratic at most) and of roads are taken by.
 _RELATIVE_STEP = 1e-3

@@ -29,8 +29,8 @@ from math import erf, exp, log, pi, sqrt
 from typing import Any, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Complex
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.effect import Chosen
 from logger.vehicle.laws import Between, CornerLaws, MotionLaw, Seen
@@ -38,8 +38,6 @@ from logger.vehicle.linear_car import MOTIONS, CornerSlopes, LinearCar, LinearLa
 from logger.vehicle.stepping import static_tire_loads_n
 from logger.vehicle.structure import Output
 from logger.vehicle.vehicle import Vehicle
-
-Array = npt.NDArray[np.float64]
 
 # Values of a normal variable at which laws are asked, and how likely each is; the one of two variables has fewer.
 _REACH = 6.0
@@ -299,13 +297,13 @@ def _check_steady(law: MotionLaw) -> None:
                              "without one here")
 
 
-def _motions(moves: Waves, s: npt.NDArray[np.complex128], i: int) -> npt.NDArray[np.complex128]:
+def _motions(moves: Waves, s: Complex, i: int) -> Complex:
     """What a ``LinearLaw`` at wheel i sees, per elevation of the road (f, MOTIONS)."""
     travel, deflection, height = moves.travel[:, i], moves.deflection[:, i], moves.height[:, i]
     return np.stack([travel, s * travel, deflection, s * deflection, s * height], axis=1)
 
 
-def _linear_law(law: MotionLaw, old: LinearLaw, motions: npt.NDArray[np.complex128], s: npt.NDArray[np.complex128],
+def _linear_law(law: MotionLaw, old: LinearLaw, motions: Complex, s: Complex,
                 power: Array, rest_m: float) -> tuple[LinearLaw, float]:
     """What stands in for a law where its corner moves like this and its states as the old stand-in has them; and what
     it pulls at the suspension on the average [N]."""

@@ -12,12 +12,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Complex
 from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.structure import Structure
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -31,7 +29,7 @@ class Mode:
 
     frequency_hz: float
     damping_ratio: float
-    shape: npt.NDArray[np.complex128]
+    shape: Complex
 
     @property
     def damped_frequency_hz(self) -> float:

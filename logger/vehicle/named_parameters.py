@@ -8,13 +8,11 @@ from functools import lru_cache
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.errors import did_you_mean
 from logger.vehicle.effect import Chosen, Parameter, Scale
 from logger.vehicle.vehicle import OWN_NAMES, Axle, Vehicle
-
-Array = npt.NDArray[np.float64]
 
 BOTH, AXLES, SENSOR = "both", ("front", "rear"), "sensor"
 PRELOAD = "preload_n"

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.vehicle.effect import (
     ActuatorEffect,
     BodyEffect,
@@ -40,8 +41,6 @@ from logger.vehicle.models import structure_of
 from logger.vehicle.structure import Structure
 from logger.vehicle.vehicle import Vehicle
 
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 Blame = Callable[[], AbstractContextManager[object]]
 """Something to ask the effect in, which turns what is raised there into a complaint about its file."""
 

@@ -17,13 +17,11 @@ from dataclasses import dataclass
 from functools import cache
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.vehicle.named_parameters import read, sized
 from logger.vehicle.uncertain import NumberErrors
 from logger.vehicle.vehicle import AT_CENTRE_OF_GRAVITY, GENERIC, Axle, SensorPlace, Vehicle
-
-Array = npt.NDArray[np.float64]
 
 OF_AXLE = ("bounce_hz", "damping_ratio", "hop_hz", "unsprung_to_sprung")
 """Of each axle with the mass that it carries: sqrt(k / m) / 2 pi, c / (2 sqrt(k m)), sqrt((k + kt) / mu) / 2 pi and

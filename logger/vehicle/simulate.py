@@ -8,14 +8,11 @@ from functools import lru_cache
 from math import ceil
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Complex
 from logger.dsp.filters import kaiser_half_length, low_pass_taps
 from logger.profiles.track import Way, WheelTracks
 from logger.vehicle.structure import Forces, Structure, pushed
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 FINE_RATE_HZ = 1000.0
 """A car is simulated in at least so many steps a second."""

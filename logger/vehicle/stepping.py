@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.profiles.track import Way
 from logger.units import STANDARD_GRAVITY_MPS2
 from logger.vehicle.laws import MOST_MEMORY, CornerLaws, Law, Law2
@@ -28,8 +29,6 @@ from logger.vehicle.structure import BASE_INPUTS, Structure, straight_step
 
 if TYPE_CHECKING:
     from logger.vehicle.stepping_loop import Asked
-
-Array = npt.NDArray[np.float64]
 
 # Points of the tables; those of two variables have so many on either side of 0.
 _POINTS = 8001

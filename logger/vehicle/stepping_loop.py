@@ -25,9 +25,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.vehicle.laws import MOST_MEMORY, MotionLaw, Seen
-
-Array = npt.NDArray[np.float64]
 
 try:
     import numba

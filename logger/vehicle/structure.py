@@ -28,12 +28,10 @@ from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.profiles.track import Alterations
 from logger.vehicle.vehicle import Axle
-
-Array = npt.NDArray[np.float64]
 
 _BLOCK = 16
 _STEPS = np.arange(_BLOCK)

@@ -8,16 +8,14 @@ from dataclasses import dataclass, replace
 from math import exp
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.vehicle.effect import Chosen, Effect, ForceEffect, Parameter
 from logger.vehicle.linearise import KnownCar, known_vehicle
 from logger.vehicle.models import structure_of
 from logger.vehicle.modes import undamped_frequencies_hz
 from logger.vehicle.named_parameters import bounds_of, changed, read, slope_of
 from logger.vehicle.vehicle import Vehicle
-
-Array = npt.NDArray[np.float64]
 
 # Directions with less of the numbers' variance than this are rounding.
 _LEAST_VARIANCE = 1e-6

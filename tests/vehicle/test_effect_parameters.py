@@ -8,10 +8,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from logger.arrays import Complex
 from logger.shipped import vehicle_file
 from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.vehicle_file import read_vehicle
-from logger.vehicle.effect import Complex, Parameter, Scale, SensorEffect, chosen
+from logger.vehicle.effect import Parameter, Scale, SensorEffect, chosen
 from logger.vehicle.named_parameters import (
     FreeParameter,
     coordinates_of,

@@ -17,6 +17,8 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array, Complex
+
 Polynomial = tuple[float, ...]
 
 # Rows b0, b1, b2, a0, a1, a2 for ``logger.dsp.filters.BlockFilter``.
@@ -97,7 +99,7 @@ class Weighting:
             parts.append(((1.0, w5 / self.q5, w5**2), (1.0, w6 / self.q6, w6**2)))
         return tuple(parts)
 
-    def response(self, f_hz: npt.ArrayLike) -> npt.NDArray[np.complex128]:
+    def response(self, f_hz: npt.ArrayLike) -> Complex:
         """Complex response of the analog weighting at ``f_hz`` [Hz], Eq 2.17."""
         s = 2j * np.pi * np.asarray(f_hz, dtype=np.float64)
         product = np.ones_like(s)
@@ -105,7 +107,7 @@ class Weighting:
             product *= np.polyval(numerator, s) / np.polyval(denominator, s)
         return product
 
-    def weigh(self, accel_mps2: npt.ArrayLike, rate_hz: float) -> npt.NDArray[np.float64]:
+    def weigh(self, accel_mps2: npt.ArrayLike, rate_hz: float) -> Array:
         """The weighted acceleration of a whole record (n,), n > 0, sampled at ``rate_hz`` [Hz]; magnitude and phase are
         the formula's.
 

@@ -36,6 +36,7 @@ from typing import Protocol
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array, Bools, Complex
 from logger.dsp.filters import DecimatingLowPass
 from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM, PIVOT_CPM
 from logger.identification.noise_models import RoadNoise
@@ -53,8 +54,6 @@ from logger.identification.unknown_road.road_operator import (
 from logger.roads.iso8608 import CM3_M3, REFERENCE_N0_CPM, STANDARD_WAVINESS, displacement_psd
 from logger.vehicle.named_parameters import Free
 
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 Ints = npt.NDArray[np.intp]
 
 GD_N0, WAVINESS, NOISE, OFFSET, SCALE = "gd_n0_cm3", "waviness", "noise_mps2", "place_offset_m", "distance_scale"
@@ -397,7 +396,7 @@ class Roads:
         self.names.append(NOISE)
         self.parts = [np.append(np.arange(*pair), ends[-1]) for pair in pairwise(ends)]
 
-    def are(self, what: str) -> npt.NDArray[np.bool_]:
+    def are(self, what: str) -> Bools:
         """Which of the numbers (r,) are of this kind: ``GD_N0``, ``WAVINESS``, ``OFFSET``, ``SCALE``, ``NOISE``."""
         return np.array([name.rpartition(".")[2] == what for name in self.names])
 

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.fitting.fisher_scoring import Maximum, maximise
 from logger.fitting.information_matrix import inverse
 from logger.identification.identifiability import APART, NOT_ONE_ROAD, Finding, NotIdentifiable, statistical, structural
@@ -26,8 +26,6 @@ from logger.identification.unknown_road.marginal_likelihood import (
 )
 from logger.identification.unknown_road.road_operator import Grid, RoadDrive
 from logger.vehicle.named_parameters import WEAKEST, Coordinates
-
-Array = npt.NDArray[np.float64]
 
 _WAVINESS = (1.0, 3.5)  # of the flattest and the steepest road there is
 # How long a step may be; how many standard errors from the end the end is reached.

@@ -20,11 +20,9 @@ import numpy as np
 import numpy.typing as npt
 from scipy.fft import irfft, rfft
 
+from logger.arrays import Array, Complex
 from logger.estimation.road_solver import patch_gain
 from logger.vehicle.simulate import smooth_length
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 _SWELL_S, _APPROACH_S, _TAIL_S, _REST_S = 2.0, 3.0, 1.0, 2.0
 # Above this share of the rate the recorder lets nothing through, and waves of the road are left out.

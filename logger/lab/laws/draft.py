@@ -21,15 +21,13 @@ from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.runs import Run
 from logger.vehicle.compose import Response
 from logger.vehicle.effect import Chosen, Effect, Parameter
 from logger.vehicle.vehicle import Vehicle
-
-Array = npt.NDArray[np.float64]
 
 LEARNED = "learned_"
 """What the names of learned effects begin with."""

@@ -5,15 +5,13 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.chart_data import CURVE_POINTS, CURVE_REACH, Curves, Line
 from logger.lab.laws.draft import Draft, LawContext
 from logger.vehicle.effect import Chosen, ForceEffect
 from logger.vehicle.laws import Seen, linear
 from logger.vehicle.uncertain import NumberErrors
-
-Array = npt.NDArray[np.float64]
 
 _AXES = {"rate": ("rate_mps", "suspension rate [m/s], positive in extension"),
          "travel": ("travel_m", "suspension travel [m], positive in extension"),

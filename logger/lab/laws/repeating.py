@@ -15,11 +15,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.lab.laws.draft import LawContext
-
-Array = npt.NDArray[np.float64]
 
 _SLOWEST_MPS = 1.0
 _FINER = 8

@@ -11,8 +11,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import CONVERGED, optimise_numbers
 from logger.lab.likelihood.posterior import NotSimulated, Posterior, State
@@ -22,8 +22,6 @@ from logger.lab.likelihood.whittle import Whitener
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.effect import Chosen
 from logger.vehicle.named_parameters import free_parameters_of
-
-Array = npt.NDArray[np.float64]
 
 
 class BySquares:

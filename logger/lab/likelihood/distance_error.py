@@ -20,16 +20,14 @@ from math import comb
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.lab.likelihood.lag import SLOWEST_MPS
 from logger.lab.likelihood.priors import CONFLICT_SIGMA, UNUSUAL_SIGMA, Tolerance
 from logger.runs import RECEIVER_ERROR_LASTS_S, SENSOR, Run
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
-
-Array = npt.NDArray[np.float64]
 
 _KNOT_S, _MOST_KNOTS = 1 / 3, 360
 """Knots lie so far apart; a run that would have more has them farther apart. Measured: with half a second, a speed that

@@ -6,9 +6,8 @@ squares, as of gamma distributed powers); the intercept is noise, of whatever co
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from logger.arrays import Array
 
 
 def steady_power(power: Array, motion: Array, sigma: float = 2.0) -> Array:

@@ -14,9 +14,8 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.runs import LATE_WITHIN_S, Run
-
-Array = npt.NDArray[np.float64]
 
 WINDOW_S = 2.56
 """Length of a window: 256 samples at 100 Hz, a quick transform, two to four bounces of a body."""

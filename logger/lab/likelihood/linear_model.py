@@ -16,8 +16,8 @@ from math import isqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.lab.likelihood.distance_error import USUAL, ErrorSize, RecordError
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.signals import JointWhitener
@@ -26,8 +26,6 @@ from logger.vehicle.named_parameters import free_parameters_of
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
-
-Array = npt.NDArray[np.float64]
 
 _UNINFORMATIVE = ErrorSize(start_m=1e3 * USUAL.start_m, scale=1e3 * USUAL.scale)
 """Start and scale error as good as free: their precisions are a millionth of a good recorder's, above what would make

@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.fitting.levenberg_marquardt import Damping, minimise
 from logger.lab.likelihood.lag import RESOLVED_M, offset_by_correlation_m, offset_by_lag_m
 from logger.lab.likelihood.linear_model import LinearModel, RecordErrorFit
@@ -32,8 +32,6 @@ from logger.vehicle.named_parameters import (
     with_coordinates,
 )
 from logger.vehicle.uncertain import grows_with_mass
-
-Array = npt.NDArray[np.float64]
 
 CONVERGED = 2.0
 """A round of a fit that gains less than this in minus twice a log-likelihood is its last: a fifth of what distinguishes

@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.dsp.white_noise import EQUAL_SIGMA, OF_QUIETEST, pooled
 from logger.lab.likelihood.growing_power import steady_power
 from logger.lab.likelihood.posterior import Posterior, State
@@ -23,8 +23,6 @@ from logger.lab.likelihood.repeats import find_repeats
 from logger.lab.likelihood.signals import SignalResiduals, by_signal
 from logger.lab.likelihood.whittle import DISCREPANCY, UNEXPLAINED, Bands
 from logger.runs import signal_errors
-
-Array = npt.NDArray[np.float64]
 
 # Noise that is quieter than this share of the quietest band where the filter begins went through the filter. The mean
 # over each sample leaves the highest frequencies two thirds of what it leaves there (the square of a sinc).

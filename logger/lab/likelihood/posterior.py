@@ -7,8 +7,8 @@ from copy import copy
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.lab.likelihood.distance_error import USUAL, ErrorSize, record_error
 from logger.lab.likelihood.priors import Tolerance, VehiclePrior
 from logger.lab.likelihood.readings import Readings
@@ -20,7 +20,6 @@ from logger.vehicle.compose import Car, compose
 from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
 
-Array = npt.NDArray[np.float64]
 Predict = Callable[[Sequence[Chosen], Array, Sequence[Array]], list[Array]]
 """Predictions (n,) per run by effects, the car's numbers and the record's errors."""
 NotSimulated = (np.linalg.LinAlgError, OverflowError)

@@ -12,14 +12,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Bools
 from logger.runs import ENCODER, SENSOR, Signal
 from logger.vehicle.named_parameters import WEAKEST, changed, read, sized
 from logger.vehicle.uncertain import Known, grows_with_mass
 from logger.vehicle.vehicle import Vehicle
-
-Array = npt.NDArray[np.float64]
 
 UNUSUAL_SIGMA = 3.0
 """More standard deviations of its prior are unusual of a nuisance parameter: of a dozen right numbers one goes as far
@@ -75,7 +73,7 @@ class Tolerance:
         return self.band * self.numbers
 
 
-def is_length(names: Sequence[str]) -> npt.NDArray[np.bool_]:
+def is_length(names: Sequence[str]) -> Bools:
     """Which of a vehicle's numbers (p,) are lengths."""
     return np.array([name.endswith(("cg_distance_m", "contact_patch_m")) for name in names], dtype=bool)
 
@@ -112,7 +110,7 @@ class VehiclePrior:
                    default=0.0)
 
     @property
-    def _not_measured(self) -> npt.NDArray[np.bool_]:
+    def _not_measured(self) -> Bools:
         return np.asarray(UNUSUAL_SIGMA * self.deviations > WEAKEST, bool)
 
     def cost(self, logs: Array) -> float:

@@ -23,11 +23,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
-from logger.runs import CLIPPED, READING, Bools, Run, normalised_rms
-
-Array = npt.NDArray[np.float64]
+from logger.arrays import Array, Bools
+from logger.runs import CLIPPED, READING, Run, normalised_rms
 
 BLURRED = 0.5
 """From noise of so many steps on, rounding is noise as well. Its mean still follows the acceleration by at most exp(-2

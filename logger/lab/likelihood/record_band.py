@@ -37,16 +37,13 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Bools, Complex
 from logger.dsp.filters import butterworth
 from logger.dsp.whole_record import in_band, reach
 from logger.lab.likelihood.lag import WINDOW_S, lags
 from logger.lab.likelihood.whittle import BLOCK_S, HIGHEST_OF_RATE
 from logger.runs import NO_READING, READING, LowPass, Run
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 # Of the loudest power: below that, a spectrum by Hann's windows shows rounding and what leaks from louder frequencies
 # (by Hann's window 110 dB, 60 of its lines away).
@@ -312,7 +309,7 @@ def _cutoffs_hz(rate_hz: float) -> Array:
     return np.asarray(np.exp(np.arange(np.log(_LEAST_HZ), np.log(_MOST_OF_RATE * rate_hz), _CUTOFF_STEP)))
 
 
-def _spectrum(run: Run, samples: Array) -> tuple[Array, npt.NDArray[np.bool_]]:
+def _spectrum(run: Run, samples: Array) -> tuple[Array, Bools]:
     """Mean powers in bands of one width (b,), by Welch's method [m2/s4], and which of them hold nothing."""
     kept = samples[run.first:]
     size = min(round(BLOCK_S * run.rate_hz), len(kept))

@@ -14,13 +14,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.profiles.excitation import Excitation
 from logger.runs import Run
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

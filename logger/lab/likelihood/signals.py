@@ -12,13 +12,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.lab.likelihood.readings import Readings
 from logger.lab.likelihood.whittle import Bands, Whitener
 from logger.runs import Run
-
-Array = npt.NDArray[np.float64]
 
 
 def bands_of(run: Run) -> Bands | JointBands:

@@ -10,16 +10,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import own_slopes, range_of, without_common_scale
 from logger.vehicle.effect import Chosen
 from logger.vehicle.named_parameters import FreeParameter, coordinates_of, free_parameters_of, read, slope_of
 from logger.vehicle.uncertain import NumberErrors
-
-Array = npt.NDArray[np.float64]
-
 
 _SCALE = "sprung_mass_kg"
 

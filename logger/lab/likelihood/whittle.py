@@ -16,12 +16,10 @@ from __future__ import annotations
 from itertools import count, pairwise, takewhile
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Complex
 from logger.dsp.whole_record import HALF_WIDTH_HZ
 from logger.runs import EVEN_SAMPLES, READING, Run, Signal
-
-Array = npt.NDArray[np.float64]
 
 DISCREPANCY = 0.003
 """Share of the signal in a band by which two right simulations of one car may differ. They differ most where a car has
@@ -192,12 +190,12 @@ class Whitener:
         """Whitened samples that count (..., n - first) of samples (n,) or (columns, n), in units of the noise."""
         return self._in_time(self._spectrum(samples) * self._gain)
 
-    def _in_time(self, inside: npt.NDArray[np.complex128]) -> Array:
+    def _in_time(self, inside: Complex) -> Array:
         """Samples that count (..., n - first) by their spectrum at the frequencies of the bands."""
         spectrum = np.zeros((*inside.shape[:-1], self._padded // 2 + 1), complex)
         spectrum[..., self._inside] = inside
         return np.fft.irfft(spectrum, self._padded, axis=-1)[..., : self._count]
 
-    def _spectrum(self, samples: Array) -> npt.NDArray[np.complex128]:
+    def _spectrum(self, samples: Array) -> Complex:
         """Spectrum of the samples that count, at the frequencies of the bands."""
         return np.fft.rfft(samples[..., self._first:], self._padded, axis=-1)[..., self._inside]

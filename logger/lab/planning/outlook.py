@@ -24,6 +24,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.lab.likelihood.distance_error import USUAL
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.planning.planned_drive import SIZES, FisherInformation, with_larger_errors
@@ -31,7 +32,6 @@ from logger.lab.selection.detectability import DETECTABLE_SIGMA, is_uninformativ
 from logger.lab.selection.evidence import INDISTINGUISHABLE
 from logger.vehicle.effect import Chosen, Effect, chosen
 
-Array = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.intp]
 
 ISOLABLE_SIGMA = float(np.sqrt(INDISTINGUISHABLE))

@@ -15,8 +15,8 @@ from functools import partial, reduce
 from operator import add
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.lab.diagnosis import obstacles_of
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import fit_model
@@ -48,7 +48,6 @@ from logger.profiles.track import Track
 from logger.runs import Run
 from logger.vehicle.effect import Chosen, Effect
 
-Array = npt.NDArray[np.float64]
 Progress = Callable[[str], None]
 
 _LINEAR_SIGMA = 3.0

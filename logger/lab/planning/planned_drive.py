@@ -16,8 +16,8 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.lab.likelihood.distance_error import USUAL, ErrorSize
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.posterior import Posterior, State
@@ -32,8 +32,6 @@ from logger.units import STANDARD_GRAVITY_MPS2
 from logger.vehicle.effect import Chosen
 from logger.vehicle.models import structure_of
 from logger.vehicle.vehicle import Vehicle
-
-Array = npt.NDArray[np.float64]
 
 RATE_HZ = 100.0
 SEARCH_HZ = 500.0

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.lab.residuals.breakdown import INDEPENDENT_S, ModelResiduals
-
-Array = npt.NDArray[np.float64]
 
 
 def block_means(residuals: ModelResiduals, signals: Sequence[Array], blocks: int = 1) -> Array:

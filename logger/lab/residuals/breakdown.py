@@ -14,16 +14,14 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Complex
 from logger.lab.likelihood.lag import WINDOW_S
 from logger.runs import Run, are_on_rig
 from logger.vehicle.compose import Car, Response
 from logger.vehicle.models import structure_of
 from logger.vehicle.modes import body_and_wheels_hz
 from logger.vehicle.simulate import PASS_OF_RATE
-
-Array = npt.NDArray[np.float64]
 
 INDEPENDENT_S = 1.0
 """Residuals so far apart count as independent: a body that bounces at 1 Hz with a third of its critical damping keeps
@@ -153,7 +151,7 @@ def breakdown(residuals: ModelResiduals) -> Breakdown:
 # --- tools that the residual tests share ---
 
 
-def segments(residuals: ModelResiduals, signals: Sequence[Array]) -> npt.NDArray[np.complex128]:
+def segments(residuals: ModelResiduals, signals: Sequence[Array]) -> Complex:
     """Spectra of all segments of some signals [(n,), ...]: (segments, frequencies), scaled to mean powers.
 
     Segments overlap by half and are tapered (Hann). They are as long as the longest run at most; a run shorter than one

@@ -6,14 +6,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.chart_data import CURVE_POINTS, CURVE_REACH
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.vehicle.compose import Car
 from logger.vehicle.laws import CornerLaws
-
-Array = npt.NDArray[np.float64]
 
 RATE, TRAVEL = "rate", "travel"
 

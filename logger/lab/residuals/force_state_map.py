@@ -15,8 +15,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.identification.noise_models import autocorrelation
 from logger.lab.residuals.breakdown import ModelResiduals
 from logger.runs import SENSOR
@@ -24,7 +24,6 @@ from logger.simulation.virtual_drive import output_of
 from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.simulate import smooth_length
 
-Array = npt.NDArray[np.float64]
 Shape = Callable[[Array, Array], Array]
 
 _KNOTS = np.array([-2.8, -1.8, -1.1, -0.6, -0.25, 0.0, 0.25, 0.6, 1.1, 1.8, 2.8])

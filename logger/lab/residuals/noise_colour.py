@@ -13,8 +13,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.lab.likelihood.growing_power import growing_power
 from logger.lab.likelihood.noise_floor import NoiseLevel
 from logger.lab.likelihood.posterior import Posterior, State
@@ -22,8 +22,6 @@ from logger.lab.likelihood.signals import JointBands
 from logger.lab.likelihood.whittle import UNEXPLAINED, Bands
 from logger.lab.residuals.removed import removed_from
 from logger.lab.residuals.unexplained import Shape, shape_of
-
-Array = npt.NDArray[np.float64]
 
 COLOUR = frozenset({"whiteness", "frequency"})
 """Tests of a residual that only say that it has a colour."""

@@ -13,16 +13,14 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.lab.likelihood.distance_error import unusual_distance_error_m
 from logger.lab.likelihood.noise_floor import sensor_noise_of
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.residual_tests.tests import LEAST_SHARE
 from logger.lab.residuals.sensor_drift import Drift, drifts_of
 from logger.runs import Run
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

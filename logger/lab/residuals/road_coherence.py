@@ -14,15 +14,13 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.lab.likelihood.whittle import LOWEST_HZ
 from logger.lab.residuals.breakdown import ModelResiduals, frequencies, segments
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Way
 from logger.runs import Run
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,13 +15,11 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.lab.likelihood.whittle import LOWEST_HZ
 from logger.lab.residual_tests.tests import SIGNIFICANCE
 from logger.runs import Run
-
-Array = npt.NDArray[np.float64]
 
 NONE, OFFSET, RAMP, STEP, EXPONENTIAL, WANDER = "none", "offset", "ramp", "step", "exponential", "wander"
 

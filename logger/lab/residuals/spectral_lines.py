@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
+from logger.arrays import Array, Bools
 
 NEIGHBOURS = 15
 """An ordinate is compared with so many on either side, or more: the mean of thirty, of which a Hann taper leaves 15

@@ -11,8 +11,8 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.residual_tests import run_residual_tests
 from logger.lab.residual_tests.tests import SIGNIFICANCE, ResidualEvidence, ResidualTestResults
@@ -20,8 +20,6 @@ from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown
 from logger.lab.residuals.removed import Removed
 from logger.lab.residuals.spectral_lines import NEIGHBOURS, periodogram, strongest_line
 from logger.runs import short_names
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,12 +9,10 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale
 from logger.vehicle.laws import CornerLaws
-
-Array = npt.NDArray[np.float64]
 
 
 class DamperAsymmetry(ForceEffect):

@@ -10,7 +10,8 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from logger.vehicle.effect import ActuatorEffect, Array, Parameter, Scale, Sought
+from logger.arrays import Array
+from logger.vehicle.effect import ActuatorEffect, Parameter, Scale, Sought
 
 
 class ForceLimit(ActuatorEffect):

@@ -13,12 +13,10 @@ from collections.abc import Mapping
 from types import SimpleNamespace
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Complex
 from logger.dsp.filters import butterworth
 from logger.vehicle.effect import Misalignment, Parameter, Scale, SensorEffect
-
-Complex = npt.NDArray[np.complex128]
 
 _HIGHEST = 8
 # Of the sample rate, where a filter that was run on the samples is tried: below about a fifth a sensor's does as well.

@@ -5,11 +5,9 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Complex
 from logger.vehicle.effect import Parameter, Scale, SensorEffect
-
-Complex = npt.NDArray[np.complex128]
 
 
 class SensorGain(SensorEffect):

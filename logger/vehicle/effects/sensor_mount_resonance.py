@@ -8,11 +8,9 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Complex
 from logger.vehicle.effect import Misalignment, Parameter, Scale, SensorEffect, resonances_hz
-
-Complex = npt.NDArray[np.complex128]
 
 
 class SensorMountResonance(SensorEffect):

@@ -7,12 +7,8 @@ from __future__ import annotations
 
 from types import SimpleNamespace
 
-import numpy as np
-import numpy.typing as npt
-
+from logger.arrays import Array
 from logger.vehicle.effect import DriveEffect, Misalignment, Parameter, Scale
-
-Array = npt.NDArray[np.float64]
 
 # So little moves all waves alike: a search can see from it how much it takes. Runs lie wrong from the second on.
 _LITTLE, _WRONG = 1e-5, 0.0005

@@ -7,12 +7,10 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Complex
 from logger.vehicle.effect import Misalignment, Parameter, Scale, SensorEffect
 from logger.vehicle.vehicle import OWN_NAMES
-
-Complex = npt.NDArray[np.complex128]
 
 # So little moves all waves alike: a search can see from it how much it takes. Runs lie wrong from the second on.
 _LITTLE_S, _WRONG_S = 2e-4, 0.002

@@ -11,11 +11,12 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from logger.arrays import Complex
 from logger.lab.likelihood.distance_error import USUAL, ErrorSize
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit
 from logger.lab.likelihood.standard_errors import deviations_from_null, standard_errors, with_standard_errors
-from logger.vehicle.effect import Chosen, Complex, Parameter, Scale, SensorEffect, chosen
+from logger.vehicle.effect import Chosen, Parameter, Scale, SensorEffect, chosen
 from logger.vehicle.named_parameters import free_parameters_of
 from logger.vehicle.uncertain import grows_with_mass
 

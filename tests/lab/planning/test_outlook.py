@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from logger.arrays import Array
 from logger.lab.likelihood.priors import Tolerance, VehiclePrior
 from logger.lab.planning.outlook import EffectGrid, outlook, representatives
 from logger.lab.planning.planned_drive import FisherInformation, PlannedCar, PlannedDrive, SensorNoise, at_speed
 from logger.profiles.track import Track
 from logger.roads import iso8608
-from logger.runs import Array
 from logger.shipped import vehicle_file
 from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.vehicle_file import read_vehicle

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from logger.arrays import Array
 from logger.lab.planning.outlook import LinearisedDrives, refitted_gain
 from logger.lab.planning.planned_drive import PlannedDrive
-from logger.runs import Array
 
 from .test_outlook import planned
 

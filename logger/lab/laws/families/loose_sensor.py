@@ -16,12 +16,10 @@ from __future__ import annotations
 from types import SimpleNamespace
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
 from logger.vehicle.effect import Chosen, Parameter, RecordEffect, Recording, Scale
-
-Array = npt.NDArray[np.float64]
 
 _FUNCTIONS = """
 FINER = 8  # steps in which the flight is followed, of each of the record's
