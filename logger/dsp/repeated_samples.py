@@ -160,7 +160,7 @@ def find_repeats(samples: Array, false_alarm: float = FALSE_ALARM) -> RepeatedSa
     return RepeatedSamples(share, chance, fresh, _period(np.flatnonzero(fresh)))
 
 
-def find_holds(time_s: Array, samples: Array, false_alarm: float = FALSE_ALARM) -> Bools:
+def find_holds(time_s: Array, samples: Array) -> Bools:
     """Which samples (n, axes) at times (n,) [s] repeat the one before in a stretch in which the sensor stood still on
     all axes for longer than by chance (n,). Before it moved for the first time it may have been parked, unless it
     stood still for longer later."""
@@ -174,7 +174,7 @@ def find_holds(time_s: Array, samples: Array, false_alarm: float = FALSE_ALARM) 
     size = np.append(np.inf, moves(samples, steps))[places]
     span = np.ptp(samples, axis=0)
     extreme = ((samples == samples.max(axis=0)) | (samples == samples.min(axis=0)) | (span == 0)).all(axis=1)
-    least, longest = log(len(samples) / false_alarm), 0
+    least, longest = log(len(samples) / FALSE_ALARM), 0
     may_be = (end - first) * log(max(2.0, float(size[1:].max(initial=0.0)))) > least
     for begin, stop in zip(first[may_be], end[may_be], strict=True):
         at = int(np.searchsorted(places, begin))
@@ -197,11 +197,11 @@ def _finest(values: Array) -> float:
     return float(np.quantile(there, _OUTER)) if len(there) else 0.0
 
 
-def are_fresh(samples: Array, least_stretches: int = 20) -> bool:
-    """Whether samples (n, axes) show that none is held: of so many turning points no more stand still than by chance.
-    In a held record nearly all of them do."""
+def are_fresh(samples: Array) -> bool:
+    """Whether samples (n, axes) show that none is held: of twenty turning points or more no more stand still than by
+    chance. In a held record nearly all of them do."""
     still, stretches = _turning_points(samples, fresh_samples(samples))
-    return stretches >= least_stretches and still <= CHANCE_STILL * stretches
+    return stretches >= 20 and still <= CHANCE_STILL * stretches
 
 
 def _turning_points(samples: Array, fresh: Bools) -> tuple[int, int]:

@@ -203,9 +203,9 @@ def motion_of(speeds: Observations, places: Observations | None = None, like: Tr
     return _fitted(speeds, places, walk, noise)
 
 
-def place_std_m(motion: TrackMotion, speeds: Observations, places: Observations, seed: int = 0) -> Array:
+def place_std_m(motion: TrackMotion, speeds: Observations, places: Observations) -> Array:
     """Standard error of the distance at the times of the fixes (k,) [m]."""
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     system = _System(speeds.time_s, motion.walk, motion.noise_mps)
     speeds = replace(speeds, deviation=speeds.deviation * motion.noise_mps)
     rows = [(1, speeds), (0, places)]

@@ -166,8 +166,8 @@ def fit_options(model: DriveModel, noise: str, low_pass_hz: float | None, tries:
                            *spread_starts(model.parameters, tries)])
 
 
-def likely_starts(model: DriveModel, draws: int = 60, best: int = 2) -> list[dict[str, float]]:
-    """The best by squares of so many cars, spread around. A car that was fitted without an effect is biased, and
+def likely_starts(model: DriveModel) -> list[dict[str, float]]:
+    """The best two by squares of sixty cars, spread around. A car that was fitted without an effect is biased, and
     downhill from there the effect may vanish: cars in which other numbers differ as well lead to where it does not."""
     def error(start: dict[str, float]) -> float:
         with np.errstate(all="ignore"):
@@ -176,7 +176,7 @@ def likely_starts(model: DriveModel, draws: int = 60, best: int = 2) -> list[dic
                                    model.measured)
         return found if np.isfinite(found) else np.inf
 
-    return sorted(spread_starts(model.parameters, draws), key=error)[:best]
+    return sorted(spread_starts(model.parameters, 60), key=error)[:2]
 
 
 def fit_down_to_0(model: DriveModel, options: FitOptions) -> Fit:

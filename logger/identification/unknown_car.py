@@ -468,10 +468,10 @@ def misfit(problem: UnknownCar, x: Array) -> float:
 
 
 def iri_errors(knowledge: CarKnowledge, x: Array, covariance: Array, speeds_mps: Sequence[float], noise: float,
-               level: float, draws: int = 40) -> Array:
+               level: float) -> Array:
     """Standard error of an IRI, as a share of it, at speeds (v,) where a car is estimated with coordinates (p,) that
-    have this covariance (p, p)."""
-    cars = np.random.default_rng(0).multivariate_normal(x, covariance, draws, method="eigh")
+    have this covariance (p, p); of forty that are drawn, so that it is known to a ninth."""
+    cars = np.random.default_rng(0).multivariate_normal(x, covariance, 40, method="eigh")
     found = []
     for speed in speeds_mps:
         own = reading_power(knowledge, x, speed)

@@ -47,13 +47,11 @@ class AnotherCar:
 
 
 def another_car(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen], predictions: Sequence[Array],
-                numbers: float, several: int = 4) -> AnotherCar | None:
+                numbers: float) -> AnotherCar | None:
     """The other car that a record is of; None: it may be this one.
 
-    predictions           of the model (n,) per run
-    numbers               standard deviation of the car's numbers, as a share
-    several               so many numbers that are unusually far off are another car's (a judgement: a missing effect
-                          changes few numbers so far)
+    predictions    of the model (n,) per run
+    numbers        standard deviation of the car's numbers, as a share
     """
     anything = Tolerance(numbers=0.5, lengths=0.1)  # cars from a small one to a van
     if numbers >= anything.numbers or normalised_rms_error(runs, predictions) < POOR_ERROR:
@@ -72,7 +70,7 @@ def another_car(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen]
     logs = np.where(lengths, found.logs, found.logs - np.median(found.logs[~lengths]))
     far = [index for index in np.argsort(-np.abs(logs)) if not lengths[index]
            and abs(logs[index]) > UNUSUAL_SIGMA * numbers]
-    if found_error > _GOOD_ERROR or len(far) < several:
+    if found_error > _GOOD_ERROR or len(far) < 4:  # a judgement: a missing effect changes few numbers so far
         return None
     return AnotherCar(some, error, found_error,
                       {wide.prior.names[index]: float(np.expm1(logs[index])) for index in far})
@@ -106,29 +104,29 @@ def reading_gain(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen
     return gain if error < _GOOD_ERROR and gain > 0 and is_far else None
 
 
-def _first_part(run: Run, lasts_s: float = 25.0) -> Run:
-    """The first part of a run: some thirty bounces of the body are enough to recognise a car by."""
-    count = min(run.count, round((run.skip_s + lasts_s) * run.rate_hz))
+def _first_part(run: Run) -> Run:
+    """The first 25 s of a run: some thirty bounces of the body are enough to recognise a car by."""
+    count = min(run.count, round((run.skip_s + 25.0) * run.rate_hz))
     return replace(run, measured_mps2=run.measured_mps2[:count], distance_m=run.distance_m[:count],
                    speed_mps=run.speed_mps[:count], usable=None if run.usable is None else run.usable[:count],
                    more=run.more[:, :count])
 
 
-def _cross_entropy_search(wide: Posterior, effects: Sequence[Chosen], error_of: Callable[[list[Array]], float],
-                          rounds: int = 6, draws: int = 60, best_of: int = 8, least_spread: float = 0.03) -> Array:
+def _cross_entropy_search(wide: Posterior, effects: Sequence[Chosen], error_of: Callable[[list[Array]], float]
+                          ) -> Array:
     """Logarithms (p,) of the numbers of a car that roughly explains a record: the best of many drawn around the best so
     far (the cross-entropy method: R. Y. Rubinstein, Methodology and Computing in Applied Probability 1,
-    1999). Each round draws so many and goes on around the mean of the best; their spread, relative to the prior's, is
-    kept from collapsing."""
+    1999). Each round draws sixty and goes on around the mean of the best eight; their spread is kept from collapsing to
+    less than 3 % of the prior's."""
     rng, deviations = np.random.default_rng(1), wide.prior.deviations
     middle, spread = np.zeros_like(deviations), 0.8 * deviations
     best, least = middle, np.inf
-    for _ in range(rounds):
-        drawn = middle + spread * rng.standard_normal((draws, len(deviations)))
+    for _ in range(6):
+        drawn = middle + spread * rng.standard_normal((60, len(deviations)))
         errors = np.array([error_of(wide.runs.predict(wide.car(effects, one), rough=True)) for one in drawn])
         ranks = np.argsort(np.where(np.isfinite(errors), errors, np.inf))
         if errors[ranks[0]] < least:
             best, least = drawn[ranks[0]], float(errors[ranks[0]])
-        middle = drawn[ranks[:best_of]].mean(axis=0)
-        spread = np.maximum(drawn[ranks[:best_of]].std(axis=0), least_spread * deviations)
+        best_of = drawn[ranks[:8]]
+        middle, spread = best_of.mean(axis=0), np.maximum(best_of.std(axis=0), 0.03 * deviations)
     return best

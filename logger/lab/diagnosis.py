@@ -197,26 +197,23 @@ class LabDiagnosis:
 
 
 def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
-             progress: Progress = lambda words: None, workers: int = 2) -> LabDiagnosis:
-    """Find the effects of ``effects`` that the model, with those that are ``present``, lacks, in so many threads.
+             progress: Progress = lambda words: None) -> LabDiagnosis:
+    """Find the effects of ``effects`` that the model, with those that are ``present``, lacks.
 
     ValueError where the vehicle lacks what an effect needs.
     """
-    def searched(posterior: Posterior) -> tuple[Search, Selection]:
-        return search_effects(posterior, effects, present, progress, workers)
-
-    search, selection = searched(posterior)
+    search, selection = search_effects(posterior, effects, present, progress)
     below = below_filter_without_delay(search, selection)
     if below is not None:
         progress("the records were filtered forth and back: searching below that")
         posterior = below
-        search, selection = searched(posterior)
+        search, selection = search_effects(posterior, effects, present, progress)
     return assess(posterior, effects, present, search, selection)
 
 
 def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
-                   progress: Progress = lambda words: None, workers: int = 2, effort: SearchEffort | None = None
-             ) -> tuple[Search, Selection]:
+                   progress: Progress = lambda words: None, effort: SearchEffort | None = None
+                   ) -> tuple[Search, Selection]:
     """The search of a diagnosis and its result; arguments as of ``diagnose``."""
     obstacles = obstacles_of(posterior, effects, present)
     tried = [one for name, one in effects.items() if name not in obstacles]
@@ -225,8 +222,9 @@ def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present:
     unknown = UnknownNumbers() if posterior.prior.is_vague else None
     before = refit(posterior, nominal) if unknown is None else unknown.fitted(posterior, present)
     search: Search[Baseline, Screened, CandidateFit] = Search(
-        tried, len(present), misalignment(posterior, nominal), progress, workers,
-        effort or (SearchEffort() if unknown is None else SearchEffort(fitted=3)), unknown or MeasuredRoad())
+        tried, len(present), misalignment(posterior, nominal), progress,
+        effort=effort or (SearchEffort() if unknown is None else SearchEffort(fitted=3)),
+        likelihood=unknown or MeasuredRoad())
     return search, search.run(before)
 
 

@@ -42,8 +42,8 @@ class ReadingsFit:
     moved_m: float = 0.0
 
 
-def fit_to_readings(model_of: ModelOf, records: list[Run], options: Callable[[DriveModel], FitOptions],
-                    rounds: int = 8) -> ReadingsFit:
+def fit_to_readings(model_of: ModelOf, records: list[Run], options: Callable[[DriveModel], FitOptions]
+                    ) -> ReadingsFit:
     """The fit of a model to records (``session.upright_fit``), with quantised readings and uncertain places.
 
     NotIdentifiable and ValueError as ``upright_fit``.
@@ -56,7 +56,7 @@ def fit_to_readings(model_of: ModelOf, records: list[Run], options: Callable[[Dr
     found, model = first, model_of(there)
     if not moves and not any(record.facts.step_mps2 for record in records):
         return ReadingsFit(first, model)
-    for turn in range(rounds):
+    for turn in range(8):
         if moves:
             at = _shift(model, found, errors, at).at
         there = [_at(record, error, k) for record, error, k in zip(records, errors, at, strict=True)]
@@ -162,9 +162,9 @@ def _refit(model: DriveModel, before: Fit, options: Callable[[DriveModel], FitOp
     return fit_down_to_0(model, replace(options(model), starts=()))
 
 
-def _has_converged(before: Fit, found: Fit, share: float = 0.1) -> bool:
-    """Whether no number changed by more than this share of its standard error."""
-    return all(abs(found.parameters[name] - before.parameters[name]) <= share * error
+def _has_converged(before: Fit, found: Fit) -> bool:
+    """Whether no number changed by more than a tenth of its standard error."""
+    return all(abs(found.parameters[name] - before.parameters[name]) <= 0.1 * error
                for name, error in found.standard_errors.items())
 
 

@@ -107,21 +107,18 @@ def match_below_bounce(run: Run, prediction: Array, body_hz: Array) -> RoadMatch
     return road_match(run, prediction, band_hz, most_lag_s=0.25 / band_hz[1])
 
 
-def road_match(run: Run, prediction: Array, band_hz: tuple[float, float], part_s: float = 8.0,
-               most_lag_s: float = _MOST_LAG_S) -> RoadMatch:
+def road_match(run: Run, prediction: Array, band_hz: tuple[float, float], most_lag_s: float = _MOST_LAG_S
+               ) -> RoadMatch:
     """Correlation of a run with a prediction (n,) between two frequencies [Hz]: of all of it, or where its distance
-    error grows along the way, of its parts, each at a lag of its own.
-
-    part_s    ten bounces of a body, in which a speed that is off by 0.1 m/s moves it by no more than a tenth of the
-              wave that bounces it at 6 m/s
-    """
+    error grows along the way, of its parts, each at a lag of its own: ten bounces of a body, 8 s, in which a speed that
+    is off by 0.1 m/s moves it by no more than a tenth of the wave that bounces it at 6 m/s."""
     expected = _expected(run, band_hz)
 
     def of(part: slice) -> RoadMatch:
         return _match(run.measured_mps2[part], prediction[part], run.rate_hz, band_hz, expected, most_lag_s)
 
     whole = of(slice(run.first, None))
-    size = round(part_s * run.rate_hz)
+    size = round(8.0 * run.rate_hz)
     starts = range(run.first, run.count - size + 1, size)
     if not whole.is_refuted or len(starts) < 2:
         return whole
@@ -130,7 +127,7 @@ def road_match(run: Run, prediction: Array, band_hz: tuple[float, float], part_s
 
 
 def _match(measured_mps2: Array, model_mps2: Array, rate_hz: float, band_hz: tuple[float, float],
-           expected: float, most_lag_s: float, false_alarm: float = FALSE_ALARM) -> RoadMatch:
+           expected: float, most_lag_s: float) -> RoadMatch:
     """Correlation of samples (n,) of a measurement with a model's."""
     measured, model = (_spectrum(one, rate_hz, band_hz) for one in (measured_mps2, model_mps2))
     count = len(measured_mps2)
@@ -149,17 +146,17 @@ def _match(measured_mps2: Array, model_mps2: Array, rate_hz: float, band_hz: tup
     deviation = float(np.sqrt(np.mean(correlation[far] ** 2 * count / (count - lag[far]))))
     # Maxima of as many independent values as a band of this width has within these lags.
     values = max(1.0, 4 * most_lag_s * (band_hz[1] - band_hz[0]))
-    chance, mean_chance = (deviation * float(np.sqrt(2 * np.log(one))) for one in (values / false_alarm, values))
+    chance, mean_chance = (deviation * float(np.sqrt(2 * np.log(one))) for one in (values / FALSE_ALARM, values))
     return RoadMatch(upright, turned, gain, chance, mean_chance, expected)
 
 
 def better_placement(run: Run, predict: Callable[[Array, bool], Array], band_hz: tuple[float, float],
-                     ends_m: tuple[float, float], most_places: int = 200) -> Placement | None:
-    """The place along a profile at which a run clearly fits; None: nowhere.
+                     ends_m: tuple[float, float]) -> Placement | None:
+    """The place along a profile at which a run clearly fits, of the nearest 200 either way (some kilometres, in
+    seconds); None: nowhere.
 
-    predict        prediction (n,) with a distance error (n,) [m], on the profile or on the reversed one
-    ends_m         beginning and end of the profile [m]
-    most_places    places that are tried, the nearest first: some kilometres, in seconds
+    predict    prediction (n,) with a distance error (n,) [m], on the profile or on the reversed one
+    ends_m     beginning and end of the profile [m]
     """
     usual_mps = float(np.median(run.speed_mps[run.first:]))
     step_m = max(1.6 * _MOST_LAG_S * usual_mps, 1.0)  # lags on either side of each place overlap by a fifth
@@ -167,7 +164,7 @@ def better_placement(run: Run, predict: Callable[[Array, bool], Array], band_hz:
     places_m = step_m * np.arange(np.floor(min(low_m, 0.0) / step_m), np.ceil(max(high_m, 0.0) / step_m) + 1)
     found = [Placement(float(at), backwards,
                        road_match(run, predict(np.full(run.count, at), backwards), band_hz))
-             for backwards in (False, True) for at in sorted(places_m, key=abs)[:most_places]]
+             for backwards in (False, True) for at in sorted(places_m, key=abs)[:200]]
     best = max(found, key=lambda one: one.match.correlation - one.match.chance)
     return best if best.match.is_clear and not best.match.is_upside_down else None
 
@@ -181,17 +178,14 @@ def _spectrum(samples: Array, rate_hz: float, band_hz: tuple[float, float]) -> C
     return np.asarray(spectrum)
 
 
-def _expected(run: Run, band_hz: tuple[float, float], without_noise: float = 0.5) -> float:
+def _expected(run: Run, band_hz: tuple[float, float]) -> float:
     """The least correlation with the right road, where noise of the level at the highest frequencies is a share of what
-    was measured.
-
-    without_noise    measured: the right road gave 0.63 and more in 200 runs of 56 simulated cars with one, two or
-                     unlisted effects missing, each far stronger than the noise; wrong roads at most 0.36
-    """
+    was measured. Without noise the right road gave 0.63 and more in 200 runs of 56 simulated cars with one, two or
+    unlisted effects missing, wrong roads at most 0.36: half."""
     noise, _ = Bands(run).noise_band_power(run.measured_mps2)
     kept = run.kept_mps2 - run.kept_mps2.mean()
     power = np.abs(np.fft.rfft(kept)) ** 2 / len(kept)
     f_hz = np.fft.rfftfreq(len(kept), 1 / run.rate_hz)
     inside = (f_hz >= band_hz[0]) & (f_hz <= band_hz[1])
     road = max(0.0, 1 - noise / float(power[inside].mean()))
-    return without_noise * float(np.sqrt(road))
+    return 0.5 * float(np.sqrt(road))

@@ -169,7 +169,8 @@ def compose(vehicle: Vehicle, effects: Sequence[Chosen] = ()) -> Car:
         structure = effect.structure(p, structure)
     forces, laws = of(ForceEffect), []
     for axle in _axles(vehicle):
-        corner = linear(axle.suspension_damping_n_s_per_m, axle is vehicle.rear, axle.suspension_stiffness_n_per_m)
+        corner = linear(axle.suspension_damping_n_s_per_m, axle is vehicle.rear,
+                        stiffness_n_per_m=axle.suspension_stiffness_n_per_m)
         if vehicle.preload_n:
             corner = corner.with_spring(partial(_preload, vehicle.preload_n))
         for effect, p in forces:
@@ -225,7 +226,7 @@ def moved(car: Car, passage: Passage) -> Motion:
     """How the car moved at the fine instants, the front left wheel's first place its level."""
     if car.bends_laws or car.structure.held:
         return stepper_of(car, passage.step_s, passage.forces).march(
-            *passage.under_wheels(car.structure), passage.way, passage.begins)
+            *passage.under_wheels(car.structure), passage.way, begins=passage.begins)
     states = in_blocks(passage.driven(car.structure), passage, np.eye(2 * len(car.structure.mass)))
     return Motion(states, np.zeros((len(states), 2 * len(car.laws))))
 

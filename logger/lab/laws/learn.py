@@ -162,9 +162,9 @@ class Learning:
 
 
 def learn(posterior: Posterior, effects: Mapping[str, Effect], families: Mapping[str, Family],
-          known: Mapping[str, Effect], present: Sequence[Chosen] = (), progress: Progress = lambda words: None,
-          workers: int = 2) -> Learning:
-    """Learn a law, in so many threads.
+          known: Mapping[str, Effect], present: Sequence[Chosen] = (), progress: Progress = lambda words: None
+          ) -> Learning:
+    """Learn a law.
 
     effects     the known effects that are searched first, by name
     known       all that there are, by name, with those that no search tries unasked: a law may nearly be one of them
@@ -172,7 +172,7 @@ def learn(posterior: Posterior, effects: Mapping[str, Effect], families: Mapping
     ValueError where the vehicle lacks what an effect needs.
     """
     one = replace(SearchEffort(), effects=1)
-    search, selection = search_effects(posterior, effects, present, progress, workers, one)
+    search, selection = search_effects(posterior, effects, present, progress, one)
     choice = _LawChoice(search, selection, families, known)
     if not choice.outdoes_two():
         choice = choice.seeking(_LISTED)

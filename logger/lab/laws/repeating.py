@@ -70,14 +70,14 @@ def _peak(grid: Array, power: Array) -> float | None:
     return float(grid[best])
 
 
-def _power(signal: Array, way: Array, grid: Array, at_once: int = 64) -> Array:
+def _power(signal: Array, way: Array, grid: Array) -> Array:
     """Periodogram of a signal (n,) over uneven places (n,) at even wave numbers (g,)."""
     found = np.empty(len(grid))
     # Over equal steps of a wave number the phase factor of each sample is multiplied by another one.
     step = np.exp(-2j * np.pi * (grid[1] - grid[0]) * way)
-    for first in range(0, len(grid), at_once):
+    for first in range(0, len(grid), 64):  # so often that its rounding stays small
         turned = signal * np.exp(-2j * np.pi * grid[first] * way)
-        for index in range(first, min(first + at_once, len(grid))):
+        for index in range(first, min(first + 64, len(grid))):
             found[index] = abs(turned.sum()) ** 2
             turned = turned * step
     return found / len(signal)

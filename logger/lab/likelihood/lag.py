@@ -121,9 +121,9 @@ def lag_drift(windows: Lags) -> Trend:
     return _slope(lag_m, along_m, freedom)
 
 
-def constant_lag(windows: Lags, apart: float = 1.3) -> tuple[Trend, Trend, bool | None]:
+def constant_lag(windows: Lags) -> tuple[Trend, Trend, bool | None]:
     """The lag as one time [s] and as one length [m], and whether the time fits better (True) or the length (False);
-    None: slow and fast speeds differ by less than the factor ``apart``, and cannot distinguish them."""
+    None: slow and fast speeds differ by less than a third, and cannot distinguish them (a judgement)."""
     freedom = len(windows.run) - 1
     if freedom < _LEAST_FREEDOM:
         return Trend(), Trend(), None
@@ -133,10 +133,10 @@ def constant_lag(windows: Lags, apart: float = 1.3) -> tuple[Trend, Trend, bool 
     slow, fast = np.quantile(windows.speed_mps, (0.1, 0.9))
     squares_time = float(np.sum((windows.lag_s - time.value) ** 2))
     squares_length = float(np.sum((windows.lag_s - length.value / windows.speed_mps) ** 2))
-    return time, length, squares_time < squares_length if fast > apart * slow else None
+    return time, length, squares_time < squares_length if fast > 4 / 3 * slow else None
 
 
-def _windows(number: int, run: Run, prediction: Array, least_correlation: float = 0.5) -> list[tuple[float, ...]]:
+def _windows(number: int, run: Run, prediction: Array) -> list[tuple[float, ...]]:
     size, reach = round(WINDOW_S * run.rate_hz), round(LATE_WITHIN_S * run.rate_hz)
     derivative = np.gradient(prediction, 1 / run.rate_hz)
     read = run.read
@@ -152,7 +152,7 @@ def _windows(number: int, run: Run, prediction: Array, least_correlation: float 
         scale = np.sqrt((shifted**2).sum(axis=1) * (measured @ measured))
         correlation = np.divide(shifted @ measured, scale, out=np.zeros(len(shifted)), where=scale > 0)
         best = low + int(correlation.argmax())
-        if correlation[best - low] < least_correlation:
+        if correlation[best - low] < 0.5:  # the model explains less than a quarter of the window
             continue
         part = slice(best, best + size)
         columns = np.stack([prediction[part], -derivative[part]], axis=1)

@@ -304,11 +304,11 @@ class LinearModel:
                           for one, mine in zip(own, own_projections, strict=True))
 
 
-def _coordinate_descent(minus_twice_log_evidence: Callable[[Array], float], here: Array, step: float = 0.8,
-               least_step: float = 0.1) -> tuple[Array, float]:
+def _coordinate_descent(minus_twice_log_evidence: Callable[[Array], float], here: Array
+                        ) -> tuple[Array, float]:
     """Minimum of a function of logarithms of sizes (3,), coordinate by coordinate, in steps that become smaller."""
-    least = minus_twice_log_evidence(here)
-    while step > least_step:
+    least, step = minus_twice_log_evidence(here), 0.8
+    while step > 0.1:
         before = least
         for index in (1, 0, 2):
             for way in (step, -step):

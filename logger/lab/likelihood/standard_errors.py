@@ -101,15 +101,15 @@ def _covariance(linear: LinearModel) -> Array:
                                np.diag(np.where(known, 0.0, np.inf))))
 
 
-def with_standard_errors(effects: Sequence[Chosen], free_parameters: Sequence[FreeParameter], deviations: Array,
-                share: float = 1e-4) -> tuple[Chosen, ...]:
+def with_standard_errors(effects: Sequence[Chosen], free_parameters: Sequence[FreeParameter], deviations: Array
+                         ) -> tuple[Chosen, ...]:
     """The effects with standard errors of their numbers, given those of the free ones on their scales (m,); scales are
-    linear over such a share of a number."""
+    linear over a ten-thousandth of a number."""
     errors: list[Mapping[str, float]] = [{} for _ in effects]
     coordinates = coordinates_of(effects, free_parameters)
     for free, here, deviation in zip(free_parameters, coordinates, deviations, strict=True):
         parameter = effects[free.effect].effect.parameters[free.parameter]
-        step = share * max(abs(here), share)
+        step = 1e-4 * max(abs(here), 1e-4)
         # At a bound a value goes one way only: it rises by so much over the way that it went.
         high, low = parameter.value(here + step), parameter.value(here - step)
         way = abs(parameter.coordinate(high) - parameter.coordinate(low))

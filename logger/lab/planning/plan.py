@@ -109,7 +109,7 @@ class LabPlan:
 
 def plan(there: PlannedCar, runs: Posterior | None, planned: Sequence[Run], effects: Mapping[str, Effect],
          noise: SensorNoise | None, usual_noise: SensorNoise, road: Track | None,
-         progress: Progress = lambda words: None, workers: int = 2) -> LabPlan:
+         progress: Progress = lambda words: None) -> LabPlan:
     """Analyse what runs and planned drives could show of ``effects``.
 
     there          the car; its numbers are fitted to the runs first
@@ -133,7 +133,7 @@ def plan(there: PlannedCar, runs: Posterior | None, planned: Sequence[Run], effe
     obstacles = {name: why for one in posteriors for name, why in obstacles_of(one, effects, there.effects).items()}
     settings = EffectGrid.of([one for name, one in effects.items() if name not in obstacles])
     base = [run for one in posteriors for run in one.runs.runs]
-    with ThreadPoolExecutor(workers) as pool:
+    with ThreadPoolExecutor(2) as pool:  # as a search has
         analysis = _Analysis(settings, posteriors[0].prior.precision, pool)
         parts: list[_DriveSet] = []
         if fitted is not None:

@@ -115,7 +115,8 @@ class ToneTest(ResidualTest):
             f_hz = np.fft.rfftfreq(len(residual), 1 / residuals.rate_hz)
             low_hz, high_hz = run.pass_band_hz
             inside = (f_hz >= low_hz) & (f_hz <= high_hz - (0.0 if residuals.whole else HALF_WIDTH_HZ + width_hz))
-            line = strongest_line(periodogram(residual), inside, round(width_hz * len(residual) / residuals.rate_hz))
+            line = strongest_line(periodogram(residual), inside,
+                                  reach=round(width_hz * len(residual) / residuals.rate_hz))
             if line is not None:
                 tones.append((line[1] * len(residuals.runs), float(f_hz[line[0]]), names[run.name]))
         if not tones:

@@ -98,8 +98,8 @@ def _two_gains(residuals: ModelResiduals, low_hz: float, high_hz: float) -> tupl
         return None
     model, residual = ([band_pass(one, low_hz, high_hz, residuals.rate_hz) for one in signals]
                        for signals in (residuals.model, residuals.residual))
-    own = block_means(residuals, [one**2 for one in model], 2)
-    cross = block_means(residuals, [a * b for a, b in zip(residual, model, strict=True)], 2)
+    own = block_means(residuals, [one**2 for one in model], blocks=2)
+    cross = block_means(residuals, [a * b for a, b in zip(residual, model, strict=True)], blocks=2)
     third = len(own) // 3
     if third < 4 or not own.any():
         return None

@@ -22,7 +22,7 @@ def mean_of_blocks(signals: Sequence[Array], residuals: ModelResiduals) -> tuple
     p-value of a mean of 0; NaN for too few blocks."""
     from scipy.stats import ttest_1samp
 
-    means = block_means(residuals, signals, 2)
+    means = block_means(residuals, signals, blocks=2)
     if len(means) < 4:
         return float(np.concatenate(signals).mean()), np.nan, np.nan
     error = float(means.std(ddof=1) / np.sqrt(len(means)))

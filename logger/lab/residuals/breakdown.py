@@ -194,13 +194,13 @@ def _by_frequency(residuals: ModelResiduals) -> tuple[Part, ...]:
     return tuple(found)
 
 
-def _by_speed(residuals: ModelResiduals, most: int = 6) -> tuple[Part, ...]:
-    """Parts by speed, in so many round steps at most, or one more; none on rigs."""
+def _by_speed(residuals: ModelResiduals) -> tuple[Part, ...]:
+    """Parts by speed, in six round steps at most, or seven; none on rigs."""
     if are_on_rig(residuals.runs):
         return ()
     speed = np.concatenate(residuals.kept(lambda run: run.speed_mps))
     low, high = float(speed.min()), float(speed.max())
-    step = next((one for one in (0.5, 1.0, 2.0, 5.0, 10.0, 20.0) if (high - low) / one <= most), 50.0)
+    step = next((one for one in (0.5, 1.0, 2.0, 5.0, 10.0, 20.0) if (high - low) / one <= 6), 50.0)
     return _binned(residuals, speed, np.arange(np.floor(low / step), np.floor(high / step) + 2) * step)
 
 
@@ -221,10 +221,10 @@ def _running_rms(signal: Array, samples: int) -> Array:
     return np.asarray(np.sqrt(np.maximum(mean, 0.0)))
 
 
-def _by_place(residuals: ModelResiduals, place_s: float = 0.6) -> tuple[Part, ...]:
-    """Parts by place: stretches of a round length, of about this time or somewhat more; none on rigs."""
+def _by_place(residuals: ModelResiduals) -> tuple[Part, ...]:
+    """Parts by place: stretches of a round length, of about 0.6 s or somewhat more; none on rigs."""
     usual_mps = float(np.median(np.concatenate(residuals.kept(lambda run: run.speed_mps))))
-    length = next((step for step in (1.0, 2.0, 5.0, 10.0, 20.0) if step >= place_s * usual_mps), 50.0)
+    length = next((step for step in (1.0, 2.0, 5.0, 10.0, 20.0) if step >= 0.6 * usual_mps), 50.0)
     whole = sum(float(one @ one) for one in residuals.residual)
     found: list[Part] = []
     for run, residual, measured in zip(residuals.runs, residuals.residual, residuals.measured, strict=True):

@@ -22,7 +22,7 @@ from logger.lab.residuals.breakdown import ModelResiduals
 from logger.runs import SENSOR
 from logger.simulation.virtual_drive import output_of
 from logger.vehicle.linear_car import LinearCar
-from logger.vehicle.simulate import smooth_length
+from logger.vehicle.simulate import PASS_OF_RATE, smooth_length
 
 Shape = Callable[[Array, Array], Array]
 
@@ -177,8 +177,7 @@ def _curve(regression: _Regression, residuals: ModelResiduals, of_rate: bool) ->
     return Curve(knots, force, errors, p_value, share)
 
 
-def _responses_at_sensor(residuals: ModelResiduals, shapes: Sequence[Shape],
-                         highest_of_rate: float = 0.4) -> list[Array]:
+def _responses_at_sensor(residuals: ModelResiduals, shapes: Sequence[Shape]) -> list[Array]:
     """Responses of the sensor to forces of these shapes in the suspensions, up to where the recorder's filter begins:
     (n, k) per run, the samples that count."""
     car, structure, found = residuals.car, residuals.car.structure, []
@@ -186,7 +185,7 @@ def _responses_at_sensor(residuals: ModelResiduals, shapes: Sequence[Shape],
         length = smooth_length(run.count + round(4 * run.rate_hz))
         f_hz = np.asarray(np.fft.rfftfreq(length, 1 / run.rate_hz), float)
         # Where there is no spring a steady force has no end.
-        kept = np.flatnonzero((f_hz < highest_of_rate * run.rate_hz) & ((f_hz > 0) | bool(structure.stiffness.any())))
+        kept = np.flatnonzero((f_hz < PASS_OF_RATE * run.rate_hz) & ((f_hz > 0) | bool(structure.stiffness.any())))
         if structure.held:
             transfer = np.asarray(car.factor(np.asarray(2j * np.pi * f_hz[kept])))[:, None]
         else:

@@ -15,9 +15,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from logger.arrays import Array
-from logger.lab.likelihood.growing_power import growing_power
+from logger.lab.likelihood.growing_power import SURE_SIGMA, growing_power
 from logger.lab.likelihood.noise_floor import NoiseLevel
 from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.likelihood.priors import UNUSUAL_SIGMA
 from logger.lab.likelihood.signals import JointBands
 from logger.lab.likelihood.whittle import UNEXPLAINED, Bands
 from logger.lab.residuals.removed import removed_from
@@ -51,12 +52,10 @@ def coloured_noise(every: Sequence[Bands | JointBands], shape: Shape) -> NoiseLe
     return _steady_noise(bands, _whole(residuals.residual, bands), _whole(residuals.model, bands))
 
 
-def _steady_noise(every: Sequence[Bands | JointBands], residual: Sequence[Array], model: Sequence[Array],
-                  sigma: float = 2.0) -> NoiseLevel | None:
-    """The noise of residuals (n,) per run that fall or rise with frequency and do not grow with a model's motion (n,).
-
-    sigma    what grows with the motion is taken to be so many standard errors more than it is found to be
-    """
+def _steady_noise(every: Sequence[Bands | JointBands], residual: Sequence[Array], model: Sequence[Array]
+                  ) -> NoiseLevel | None:
+    """The noise of residuals (n,) per run that fall or rise with frequency and surely do not grow with a model's motion
+    (n,)."""
     bands = [one for one in every if isinstance(one, Bands)]
     if len({one.edges_hz.tobytes() for one in bands}) > 1:
         return None
@@ -67,7 +66,7 @@ def _steady_noise(every: Sequence[Bands | JointBands], residual: Sequence[Array]
     if not is_monotonic(power.mean(axis=0), freedom):
         return None
     mean = float(freedom @ power.mean(axis=0)) / float(freedom.sum())
-    may_grow = (max(float(freedom @ grows), 0.0) + sigma * float(np.linalg.norm(freedom * error))) / float(
+    may_grow = (max(float(freedom @ grows), 0.0) + SURE_SIGMA * float(np.linalg.norm(freedom * error))) / float(
         freedom.sum())
     if not mean - may_grow > mean / (1 + UNEXPLAINED) ** 2:
         return None
@@ -75,11 +74,11 @@ def _steady_noise(every: Sequence[Bands | JointBands], residual: Sequence[Array]
     return NoiseLevel(float(np.sqrt(level)), float(np.sqrt(level / (2 * freedom.sum()))))
 
 
-def is_monotonic(levels: Array, freedom: Array, sigma: float = 3.0) -> bool:
+def is_monotonic(levels: Array, freedom: Array) -> bool:
     """Whether levels (b,) with these degrees of freedom fall or rise with frequency throughout, as a sensor's noise
     does; a hum makes a hill. None may lie above the nearest levels that do (isotonic regression) by more than what
-    counts as explained and so many standard errors."""
-    most = (1 + UNEXPLAINED) ** 2 * (1 + sigma * np.sqrt(2 / freedom))
+    counts as explained and ``UNUSUAL_SIGMA`` standard errors."""
+    most = (1 + UNEXPLAINED) ** 2 * (1 + UNUSUAL_SIGMA * np.sqrt(2 / freedom))
     falling = rising_levels(levels[::-1], freedom[::-1])[::-1]
     return any(bool((levels <= most * nearest).all()) for nearest in (falling, rising_levels(levels, freedom)))
 

@@ -63,13 +63,10 @@ class _Fit:
     curve: Callable[[Array], Array]
 
 
-def drift_of(run: Run, residual: Array, noise_mps2: float, noise_hz: float = 1.5 * LOWEST_HZ,
-             fewest_coefficients: int = 8) -> Drift:
-    """The drift in a residual (n,) of a run whose sensor has white noise of this deviation [m/s2].
-
-    noise_hz               the noise is no less than the residual between ``LOWEST_HZ`` and this [Hz]
-    fewest_coefficients    fewer cannot distinguish a form of three numbers from noise: no drift is found
-    """
+def drift_of(run: Run, residual: Array, noise_mps2: float) -> Drift:
+    """The drift in a residual (n,) of a run whose sensor has white noise of this deviation [m/s2], or as much as the
+    residual has just above ``LOWEST_HZ``. A run of fewer than eight coefficients cannot distinguish a form of three
+    numbers from noise: no drift is found."""
     kept, rate = run.count - run.first, run.rate_hz
     time_s = run.time_s
     nothing = Drift(run.name, NONE, 0.0, None, np.zeros(run.count), rate)
@@ -77,9 +74,9 @@ def drift_of(run: Run, residual: Array, noise_mps2: float, noise_hz: float = 1.5
     count = int(2 * LOWEST_HZ * kept / rate)  # of frequencies below the lowest that is judged
     low_hz, _ = run.pass_band_hz
     judged_slowly = run.timed and not run.facts.main.may_drift
-    if count < fewest_coefficients or low_hz > 0 or judged_slowly or not read.any():
+    if count < 8 or low_hz > 0 or judged_slowly or not read.any():
         return nothing
-    basis = _Cosines(kept, count, int(2 * noise_hz * kept / rate))
+    basis = _Cosines(kept, count, int(1.5 * 2 * LOWEST_HZ * kept / rate))
     seen = basis.of(np.where(read, residual[run.first:], 0.0))
     level = max(noise_mps2**2, float(np.mean(seen[count:] ** 2)))
     fits = [_fit_white(form, basis, seen[:count], level, time_s[run.first:], shapes)
@@ -127,12 +124,12 @@ def _exponential(takes_s: float) -> Curve:
     return lambda at: np.asarray(np.exp(-at / takes_s))
 
 
-def _shapes(time_s: Array, rate_hz: float, time_constants: int = 60) -> dict[str, list[Shape]]:
-    """Curves by time that each form adds to a constant, each with its time (None: it has none). So many time constants
+def _shapes(time_s: Array, rate_hz: float) -> dict[str, list[Shape]]:
+    """Curves by time that each form adds to a constant, each with its time (None: it has none). Sixty time constants
     are tried, from the shortest period to twice the run's length."""
     lasts_s = time_s[-1] + 1 / rate_hz
     steps = np.arange(time_s[0], time_s[-1], 0.1 / LOWEST_HZ)[1:]
-    exponentials = np.geomspace(1 / LOWEST_HZ, 2 * lasts_s, time_constants)
+    exponentials = np.geomspace(1 / LOWEST_HZ, 2 * lasts_s, 60)
     return {
         OFFSET: [],
         RAMP: [(None, lambda at: at / lasts_s)],

@@ -16,13 +16,13 @@ def periodogram(samples: Array) -> Array:
     return np.asarray(np.abs(np.fft.rfft(samples * np.hanning(len(samples)))) ** 2)
 
 
-def strongest_line(power: Array, among: Bools | None = None, reach: int = 0, gap: int = 3) -> tuple[int, float] | None:
+def strongest_line(power: Array, among: Bools | None = None, reach: int = 0) -> tuple[int, float] | None:
     """The strongest line of a periodogram: its number, and a bound on the probability of one so strong by chance (above
     1 for weak ones): the ratio of its power to the mean of its neighbours is F(2, 2 m) in noise, Bonferroni over all.
 
-    power         (f,) of any unit
-    among         which frequencies are tested, of those with enough neighbours (f,); None: all
-    reach, gap    neighbours on either side (``NEIGHBOURS`` at least), without so many of the nearest
+    power    (f,) of any unit
+    among    which frequencies are tested, of those with enough neighbours (f,); None: all
+    reach    neighbours on either side (``NEIGHBOURS`` at least), without the nearest three
 
     None where no frequency that is tested has power around it.
     """
@@ -30,7 +30,7 @@ def strongest_line(power: Array, among: Bools | None = None, reach: int = 0, gap
     if len(power) <= 2 * reach:  # no frequency has so many neighbours
         return None
     around = np.ones(2 * reach + 1)
-    around[reach - gap : reach + gap + 1] = 0.0
+    around[reach - 3 : reach + 4] = 0.0
     level = np.convolve(power, around / around.sum(), mode="same")
     number = np.arange(len(power))
     whole = (number >= reach) & (number < len(power) - reach) & (level > 0)

@@ -68,24 +68,20 @@ def shape_of(posterior: Posterior, state: State, removed: Removed) -> Shape:
                  spatial_line_of(residuals))
 
 
-def spatial_line_of(residuals: ModelResiduals, slowest_mps: float = 1.0,
-                    per_m: tuple[float, float] = (0.3, 2.2)) -> SpatialLine | None:
-    """The strongest line along the way. A tone in time is distinguished from it where the speed changes, or where
-    another run has another speed.
-
-    slowest_mps    runs that are slower somewhere are not tested
-    per_m          wave numbers that are tested [1/m]: one to three in a turn of a wheel of 0.22 to 0.5 m radius
-    """
+def spatial_line_of(residuals: ModelResiduals) -> SpatialLine | None:
+    """The strongest line along the way, at the wave numbers of one to three in a turn of a wheel of 0.22 to 0.5 m
+    radius. A tone in time is distinguished from it where the speed changes, or where another run has another speed.
+    Runs that are slower than 1 m/s somewhere are not tested."""
     found, names = [], short_names(residuals.runs)
     for run, residual in zip(residuals.runs, residuals.residual, strict=True):
         speed = run.speed_mps[run.first:]
-        if speed.min() < slowest_mps or run.distance_m[-1] <= run.distance_m[run.first]:
+        if speed.min() < 1.0 or run.distance_m[-1] <= run.distance_m[run.first]:
             continue
         way, usual_mps = np.maximum.accumulate(run.distance_m[run.first:]), float(np.median(speed))
         step_m = usual_mps / run.rate_hz
         along = np.interp(np.arange(way[0], way[-1], step_m), way, residual)
         waves_per_m = np.fft.rfftfreq(len(along), step_m)
-        asked = (waves_per_m > per_m[0]) & (waves_per_m < per_m[1])
+        asked = (waves_per_m > 0.3) & (waves_per_m < 2.2)
         power = periodogram(along)
         line = strongest_line(power, asked)
         if line is None or asked.sum() < NEIGHBOURS:

@@ -52,7 +52,7 @@ class ChangingWithSpeed(Family):
             return []
         speed_mps = np.concatenate([run.speed_mps[run.first:] for run in context.runs])
         ends_and_mean = speed_mps.min(), speed_mps.mean(), speed_mps.max()
-        slowest, mean, fastest = (rounded(float(one), 3) for one in ends_and_mean)
+        slowest, mean, fastest = (rounded(float(one), digits=3) for one in ends_and_mean)
         if not slowest < mean < fastest:
             return []
         axles = [one for one in (context.vehicle.front, context.vehicle.rear) if one is not None]
@@ -65,7 +65,8 @@ class ChangingWithSpeed(Family):
         low, high = _ends(speeds_mps)
         share = Parameter("changed_ratio", _TRIED, rounded(low), rounded(high), 0.0, Scale.LINEAR, (_TRIED, -_TRIED),
                           f"share by which the damping is larger at {2 * mean:g} m/s than at {mean:g} m/s", step=0.02)
-        at_slowest, at_fastest = (f"p.changed_ratio * {rounded(one / mean - 1, 4)!r}" for one in (slowest, fastest))
+        at_slowest, at_fastest = (f"p.changed_ratio * {rounded(one / mean - 1, digits=4)!r}"
+                                  for one in (slowest, fastest))
         return self._draft(_DAMPERS, "dampers", (share,), _DAMPING.format(slowest=slowest, fastest=fastest),
                            _DAMPING_METHOD.format(slowest=at_slowest, fastest=at_fastest))
 

@@ -50,8 +50,8 @@ class Clipping(Family):
         reach = max(float(np.abs(run.main(one)).max()) for run, one in zip(context.runs, predictions, strict=True))
         if reach < _AT_LIMIT[1] * greatest:
             return []
-        limit = Parameter("limit_mps2", rounded(greatest, 4), rounded(0.1 * greatest), rounded(10 * greatest),
-                          float("inf"), Scale.RECIPROCAL, tuple(rounded(one * greatest, 4) for one in _AT_LIMIT),
+        limit = Parameter("limit_mps2", rounded(greatest, digits=4), rounded(0.1 * greatest), rounded(10 * greatest),
+                          float("inf"), Scale.RECIPROCAL, tuple(rounded(one * greatest, digits=4) for one in _AT_LIMIT),
                           "no reading is stronger")
         sharpness = Parameter("sharpness_ratio", 2.0, 1.0, 20.0, None, Scale.LOG, (2.0,),
                               "the higher, the later it bends")

@@ -86,7 +86,7 @@ class LooseSensor(Family):
         for shares in (np.geomspace(_WEAKEST, 1.0, _TRIED), 1 + _CLOSER):
             tried = best * shares
             best = float(tried[int(np.argmin([_squares(context, effect, predicted, held) for held in tried]))])
-        return [self._draft(rounded(best, 4), greatest)]
+        return [self._draft(rounded(best, digits=4), greatest)]
 
     def _draft(self, held_mps2: float, greatest_mps2: float) -> Draft:
         number = Parameter("held_mps2", held_mps2, rounded(0.01 * greatest_mps2), rounded(5 * greatest_mps2),
