@@ -250,29 +250,31 @@ class Test:
 UNTESTED = Test(0.0, 0, float("nan"))
 
 
-def autocorrelation(white: Sequence[Array], fitted: int, lags: int = LAGS) -> Test:
-    """Whether residuals [(n,), ...] are uncorrelated over 1 to ``lags`` samples (G. M. Ljung and G. E. P. Box 1978).
+def autocorrelations(signals: Sequence[Array], lags: int) -> Array:
+    """Correlations of the samples of signals [(n,), ...] that lie 1 ... lags apart (lags,)."""
+    power = sum(float(one @ one) for one in signals) or 1.0
+    return np.array([sum(float(one[lag:] @ one[:-lag]) for one in signals) for lag in range(1, lags + 1)]) / power
+
+
+def autocorrelation(white: Sequence[Array], fitted: int) -> Test:
+    """Whether residuals [(n,), ...] are uncorrelated over 1 to ``LAGS`` samples (G. M. Ljung and G. E. P. Box 1978).
 
     fitted    numbers of the noise model beyond its power, which take so many degrees of freedom; lags grow by them
     """
-    count, power = sum(map(len, white)), sum(float(one @ one) for one in white)
-    reach = min(lags + fitted, min(map(len, white)) - 1)
-    if power <= 0 or reach <= fitted:
+    count, reach = sum(map(len, white)), min(LAGS + fitted, min(map(len, white)) - 1)
+    if not any(one.any() for one in white) or reach <= fitted:
         return UNTESTED
-    at = np.arange(1, reach + 1)
-    correlations = np.array([sum(float(one[lag:] @ one[:-lag]) for one in white) for lag in at]) / power
-    return _test(count * (count + 2) * float((correlations**2 / (count - at)).sum()), reach - fitted)
+    squares = autocorrelations(white, reach)**2 / (count - np.arange(1, reach + 1))
+    return _test(count * (count + 2) * float(squares.sum()), reach - fitted)
 
 
-def cross_correlation(
-    white: Sequence[Array], inputs: Sequence[Array], sensitivities: Array, lags: int = LAGS
-) -> Test:
-    """Whether residuals [(n,), ...] owe anything to the inputs [(n, w), ...] of 0 to ``lags`` samples before.
+def cross_correlation(white: Sequence[Array], inputs: Sequence[Array], sensitivities: Array) -> Test:
+    """Whether residuals [(n,), ...] owe anything to the inputs [(n, w), ...] of 0 to ``LAGS`` samples before.
 
     inputs           behind the same low-pass and noise model as the residuals
     sensitivities    (N, p): what the fit could explain by its numbers has been explained and is left out
     """
-    columns = np.concatenate([_lagged(one, lags) for one in inputs])
+    columns = np.concatenate([_lagged(one) for one in inputs])
     columns = columns - sensitivities @ np.linalg.lstsq(sensitivities, columns, rcond=None)[0]
     joined = np.concatenate(white)
     lengths = np.sqrt((columns**2).sum(axis=0))
@@ -284,10 +286,10 @@ def cross_correlation(
     return _test(float(((basis.T @ joined) ** 2).sum()) / variance, basis.shape[1])
 
 
-def _lagged(inputs: Array, lags: int) -> Array:
-    """Inputs (n, w) of 0 to ``lags`` samples before (n, w (lags + 1)); 0 before the first one."""
-    padded = np.concatenate([np.zeros((lags, inputs.shape[1])), inputs])
-    return np.concatenate([padded[lags - lag : lags - lag + len(inputs)] for lag in range(lags + 1)], axis=1)
+def _lagged(inputs: Array) -> Array:
+    """Inputs (n, w) of 0 to ``LAGS`` samples before (n, w (LAGS + 1)); 0 before the first one."""
+    padded = np.concatenate([np.zeros((LAGS, inputs.shape[1])), inputs])
+    return np.concatenate([padded[LAGS - lag : LAGS - lag + len(inputs)] for lag in range(LAGS + 1)], axis=1)
 
 
 def _test(statistic: float, degrees: int) -> Test:

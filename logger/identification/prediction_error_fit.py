@@ -47,7 +47,7 @@ from logger.vehicle.named_parameters import Coordinates, Free
 _LONGEST_STEP = 1.0
 # Converged: what is left of the way is this share of a standard error; of a model that is stepped through time, this.
 _CLOSE, _CLOSE_SIMULATED, _CLOSE_NOISE = 1e-5, 1e-2, 1e-4
-_MOST_NOISE_ROUNDS = 20
+_MOST_STEPS, _MOST_NOISE_ROUNDS = 100, 20  # of one descent; of noise model and numbers in turn
 _NUDGE = 0.03
 _AT_BOUND = 1e-6
 _FAR = 3.0
@@ -84,16 +84,12 @@ class FitOptions:
     low_pass_hz    leave out what lies above [Hz]
     noise          candidates; the best by Schwarz's criterion is taken
     starts         further starts, values by name; what they do not name starts as in ``Free``
-    most_steps     of one descent
-    refuse         raise NotIdentifiable; otherwise ``Fit.verdict`` says it
     """
 
     rate_hz: float = 100.0
     low_pass_hz: float | None = None
     noise: Sequence[NoiseModel] = (White(), Autoregressive())
     starts: Sequence[Mapping[str, float]] = ()
-    most_steps: int = 100
-    refuse: bool = True
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +108,6 @@ class Fit:
     sensitivities      derivatives of the predictions behind the same, by relative change, joined (N, p)
     low_pass           the filter they went through
     noise              the noise model that was taken
-    verdict            what the data cannot identify; empty when all is well
     converged          whether steps and noise model came to rest
     iterations         steps taken in all
     cost               half the sum of squares of ``white``
@@ -133,7 +128,6 @@ class Fit:
     sensitivities: Array
     low_pass: DecimatingLowPass
     noise: Whitening
-    verdict: list[Finding]
     converged: bool
     iterations: int
     cost: float
@@ -161,14 +155,13 @@ def fit(model: Predictor, measured: Sequence[Array], options: FitOptions | None 
     """
     problem = _FitProblem(model, measured, options or FitOptions())
     starts = problem.starts()
-    findings = problem.structural_findings(problem.beside(starts[0]))
-    if findings and problem.options.refuse:
+    if findings := problem.structural_findings(problem.beside(starts[0])):
         raise NotIdentifiable(findings)
     descents = [_descend(problem, start, problem.plain) for start in starts]
     best = descents[int(np.argmin([one.at.cost for one in descents]))]
     iterations = sum(one.rounds for one in descents)
     noise, point, rounds, settled = _innovations(problem, best.at)
-    return _result(problem, point, noise, findings, iterations + rounds, settled,
+    return _result(problem, point, noise, iterations + rounds, settled,
                    np.array([problem.coordinates.values(one.x) for one in descents]))
 
 
@@ -322,7 +315,7 @@ def _descend(problem: _FitProblem, start: Array, noise: Whitening) -> Minimum[_P
     close = _CLOSE if problem.exact else _CLOSE_SIMULATED
     return minimise(start, lambda x: problem.at(x, noise), normal_equations,
                     small_gain=lambda point: close**2 * point.cost / len(point.white),
-                    most_rounds=problem.options.most_steps, keep_derivatives=not problem.exact,
+                    most_rounds=_MOST_STEPS, keep_derivatives=not problem.exact,
                     low=problem.low, high=problem.high, longest_step=_LONGEST_STEP)
 
 
@@ -349,20 +342,18 @@ def _innovations(problem: _FitProblem, point: _Point) -> tuple[Whitening, _Point
 # --- the result ---
 
 
-def _result(problem: _FitProblem, point: _Point, noise: Whitening, findings: list[Finding], iterations: int,
-            settled: bool, ends: Array) -> Fit:
+def _result(problem: _FitProblem, point: _Point, noise: Whitening, iterations: int, settled: bool,
+            ends: Array) -> Fit:
     names = [one.name for one in problem.free]
     slopes = noise(problem.linearised(point.x).slopes)
     relative = _covariance(problem, point, slopes)
     at_bound = [one.name for one, x, low, high in zip(problem.free, point.x, problem.low, problem.high, strict=True)
                 if (x - low < _AT_BOUND and not (one.may_be_0 and one.low == 0)) or high - x < _AT_BOUND]
     values = problem.coordinates.values(point.x)
-    if not findings:
-        weakest = [one.weakest_at(value) for one, value in zip(problem.free, values, strict=True)]
-        findings = (problem.structural_findings(point.x) or statistical(names, relative, np.array(weakest))
-                    or unexplained(normalised_rms(point.plain, problem.observed)))
-        if findings and problem.options.refuse:
-            raise NotIdentifiable(findings)
+    weakest = [one.weakest_at(value) for one, value in zip(problem.free, values, strict=True)]
+    if findings := (problem.structural_findings(point.x) or statistical(names, relative, np.array(weakest))
+                    or unexplained(normalised_rms(point.plain, problem.observed))):
+        raise NotIdentifiable(findings)
     scale = problem.coordinates.slopes(values)
     covariance = relative * np.outer(scale, scale)
     errors = np.sqrt(np.diag(covariance))
@@ -378,7 +369,7 @@ def _result(problem: _FitProblem, point: _Point, noise: Whitening, findings: lis
         error_before=normalised_rms(before, problem.measured),
         error_after=normalised_rms(after, problem.measured), residuals=after,
         white=np.split(point.white, np.cumsum([len(one) for one in point.plain])[:-1]),
-        sensitivities=slopes, low_pass=problem.low_pass, noise=noise, verdict=findings, converged=settled,
+        sensitivities=slopes, low_pass=problem.low_pass, noise=noise, converged=settled,
         iterations=iterations, cost=point.cost, at_bound=at_bound, ends=ends,
         prior=(problem.precision, problem.pull(point.x)),
     )

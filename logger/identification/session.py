@@ -11,7 +11,7 @@ fits best there, and the place that leaves the least is taken; near enough for a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -171,9 +171,7 @@ def likely_starts(model: DriveModel) -> list[dict[str, float]]:
     downhill from there the effect may vanish: cars in which other numbers differ as well lead to where it does not."""
     def error(start: dict[str, float]) -> float:
         with np.errstate(all="ignore"):
-            predictions = model.predict(np.array([start[one.name] for one in model.parameters]))
-            found = normalised_rms([measured - one for measured, one in zip(model.measured, predictions, strict=True)],
-                                   model.measured)
+            found = error_before(model, start)
         return found if np.isfinite(found) else np.inf
 
     return sorted(spread_starts(model.parameters, 60), key=error)[:2]
@@ -223,8 +221,8 @@ def upright_fit(
     return found
 
 
-def error_before(model: DriveModel) -> float:
-    """rms(measured - model) / rms(measured) with every free number where it starts."""
-    predictions = model.predict(np.array([one.start for one in model.parameters]))
+def error_before(model: DriveModel, start: Mapping[str, float] | None = None) -> float:
+    """rms(measured - model) / rms(measured) with every free number where it starts, or at another ``start``."""
+    predictions = model.predict(np.array([one.start if start is None else start[one.name] for one in model.parameters]))
     return normalised_rms([measured - one for measured, one in zip(model.measured, predictions, strict=True)],
                           model.measured)

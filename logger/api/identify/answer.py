@@ -512,7 +512,6 @@ def measured_json(fit: Fit, white: Test, free_of_road: Test) -> dict[str, Any]:
 
 def doubts(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
     """What stands between the estimates and their being believed, each in words; nothing when all is well."""
-    yield from (finding.words for finding in fit.verdict)
     if not fit.converged:
         yield "the fit did not converge."
     if fit.at_bound:
@@ -635,8 +634,6 @@ def _measured_limits(fit: Fit, sound: bool) -> Iterator[str]:
         if fit.noise.name != "white":
             yield ("Coloured noise can absorb what the model lacks, most of all in a sweep, which has one frequency "
                    "at a time: try --noise white.")
-    for finding in fit.verdict:
-        yield f"Cannot tell: {finding.words}"
     sizes = [one.name for one in fit.free if one.by_factors]
     vague = {name: error / abs(fit.parameters[name]) for name, error in fit.standard_errors.items()
              if name in sizes and error > _DOUBTFUL * abs(fit.parameters[name])}

@@ -16,7 +16,6 @@ import numpy as np
 
 from logger.lab.laws.draft import Draft
 from logger.lab.likelihood.posterior import Posterior
-from logger.lab.likelihood.signals import JointBands
 from logger.lab.likelihood.standard_errors import deviations_from_null, standard_errors
 from logger.lab.selection.evidence import INDISTINGUISHABLE
 from logger.lab.selection.screening import Baseline
@@ -114,7 +113,7 @@ def does_nothing(one: Chosen, errors: NumberErrors) -> bool:
 def _beyond(posterior: Posterior, one: Chosen) -> str:
     """Why the numbers of a law are none that the records show; empty where they are."""
     frequency_hz = one.values.get("frequency_hz")
-    bands = [each for run in posterior.bands for each in (run.each if isinstance(run, JointBands) else [run])]
+    bands = [each for run in posterior.bands for each in run.each]
     low_hz, high_hz = min(each.edges_hz[0] for each in bands), max(each.edges_hz[-1] for each in bands)
     if frequency_hz is not None and not low_hz < frequency_hz < high_hz:
         return (f"its frequency, {frequency_hz:.3g} Hz, is outside of {low_hz:.2g} to {high_hz:.3g} Hz, in which the "

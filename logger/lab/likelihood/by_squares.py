@@ -18,7 +18,6 @@ from logger.lab.likelihood.map_fit import CONVERGED, optimise_numbers
 from logger.lab.likelihood.posterior import NotSimulated, Posterior, State
 from logger.lab.likelihood.repeats import repeat_each_other
 from logger.lab.likelihood.signals import JointWhitener
-from logger.lab.likelihood.whittle import Whitener
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.effect import Chosen
 from logger.vehicle.named_parameters import free_parameters_of
@@ -38,7 +37,7 @@ class BySquares:
             posterior.start_vehicle, posterior.prior, [posterior.readings[one] for one in kept])
         self.whiteners = self._whiteners(1.0)
 
-    def _whiteners(self, noise: float) -> list[Whitener | JointWhitener]:
+    def _whiteners(self, noise: float) -> list[JointWhitener]:
         """For a noise that is such a share of what was measured."""
         return [bands.flat_whitener(noise * np.concatenate([run.measured_mps2 * run.read, *run.more]))
                 for bands, run in zip(self.posterior.bands, self.posterior.runs.runs, strict=True)]

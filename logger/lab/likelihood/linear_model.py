@@ -21,7 +21,6 @@ from logger.arrays import Array
 from logger.lab.likelihood.distance_error import USUAL, ErrorSize, RecordError
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.signals import JointWhitener
-from logger.lab.likelihood.whittle import Whitener
 from logger.vehicle.named_parameters import free_parameters_of
 
 if TYPE_CHECKING:
@@ -40,13 +39,13 @@ class _Record:
 
     error: RecordError
     slopes: csr_array
-    whitener: Whitener | JointWhitener
+    whitener: JointWhitener
     gram: Array
     gradient: Array
     here: Array
 
     @staticmethod
-    def of(error: RecordError, slopes: csr_array, whitener: Whitener | JointWhitener, residual: Array,
+    def of(error: RecordError, slopes: csr_array, whitener: JointWhitener, residual: Array,
            here: Array) -> _Record:
         """With derivatives (k, n), at a residual (n,) and the numbers (k,)."""
         white = np.empty((error.count, whitener.kept))
@@ -139,11 +138,11 @@ class LinearModel:
     """
 
     def __init__(self, posterior: Posterior, state: State, numbers: Sequence[Array] | None = None,
-                 expected: Sequence[Whitener | JointWhitener] | None = None) -> None:
+                 expected: Sequence[JointWhitener] | None = None) -> None:
         self.posterior, self.prior = posterior, posterior.prior
         residuals = posterior.residuals(state)
         self._predictions = state.predictions
-        self.whiteners: list[Whitener | JointWhitener] = [
+        self.whiteners = [
             one.whitener(residual) for one, residual in zip(posterior.bands, residuals, strict=True)
         ] if expected is None else list(expected)
         self._records = [

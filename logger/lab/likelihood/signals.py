@@ -19,20 +19,18 @@ from logger.lab.likelihood.whittle import Bands, Whitener
 from logger.runs import Run
 
 
-def bands_of(run: Run) -> Bands | JointBands:
+def bands_of(run: Run) -> JointBands:
     """The bands of all that was measured in a run."""
-    if not run.signals:
-        return Bands(run)
     return JointBands([Bands(run), *(Bands(run, index) for index in range(len(run.signals)))])
 
 
-def deviance(bands: Sequence[Bands | JointBands], residuals: Sequence[Array]) -> float:
+def deviance(bands: Sequence[JointBands], residuals: Sequence[Array]) -> float:
     """Minus twice the log-likelihood of residuals (n,) of several runs, without its constant."""
     return sum(one.deviance(residual) for one, residual in zip(bands, residuals, strict=True))
 
 
 class JointBands:
-    """The bands (b,) of several signals of one run. Methods as of ``Bands``, of the signals joined."""
+    """The bands (b,) of all signals of one run. Methods as of ``Bands``, of the signals joined."""
 
     def __init__(self, each: Sequence[Bands]) -> None:
         self.each = list(each)
@@ -62,7 +60,7 @@ class JointBands:
 
 @dataclass(frozen=True, eq=False)
 class JointWhitener:
-    """Whitens several signals of one run. Methods as of ``Whitener``, of the signals joined."""
+    """Whitens all signals of one run. Methods as of ``Whitener``, of the signals joined."""
 
     each: list[Whitener]
 
@@ -102,17 +100,16 @@ class SignalResiduals:
     size: float
 
 
-def by_signal(readings: Sequence[Readings], bands: Sequence[Bands | JointBands],
+def by_signal(readings: Sequence[Readings], bands: Sequence[JointBands],
               residuals: Sequence[Array]) -> list[SignalResiduals]:
     """Residuals of joined signals ((1 + s) n,), per run, by signal and sensor."""
     found: dict[tuple[str, float | None, float | None], list[tuple[Run, Bands, Array, float, Array]]] = {}
     for one, own, residual in zip(readings, bands, residuals, strict=True):
         run = one.run
         counts = run.read & (np.arange(run.count) >= run.first)
-        each = own.each if isinstance(own, JointBands) else [own]
         names = ["", *(signal.name for signal in run.signals)]
         measured = [run.measured_mps2, *run.more]
-        for name, band, part, of in zip(names, each, np.split(residual, len(each)), measured, strict=True):
+        for name, band, part, of in zip(names, own.each, own.parts(residual), measured, strict=True):
             sensor = (None, None) if name else (run.facts.step_mps2, run.facts.range_mps2)
             found.setdefault((name, *sensor), []).append((run, band, part, 1.0 if name else one.share, of[counts]))
     return [SignalResiduals(

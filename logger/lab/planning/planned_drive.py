@@ -23,7 +23,7 @@ from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.signals import JointBands, JointWhitener
-from logger.lab.likelihood.whittle import Bands, Whitener
+from logger.lab.likelihood.whittle import Whitener
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.runs import RecordFacts, Run, Signal
@@ -160,22 +160,20 @@ class PlannedDrive:
         state = self._state_of(posterior, self._of_kept(self._here, signals))
         return LinearModel(posterior, state, [self._of_kept(self.numbers, signals)], expected)
 
-    def levels(self, run: Run, bands: Bands | JointBands) -> list[Array]:
+    def levels(self, run: Run, bands: JointBands) -> list[Array]:
         """Expected noise levels in each band (b,), of the sensor and of each signal of a run."""
-        each = bands.each if isinstance(bands, JointBands) else [bands]
         return [np.maximum(self._noise.variance_of(signal), one.floor)
-                for one, signal in zip(each, (None, *run.signals), strict=True)]
+                for one, signal in zip(bands.each, (None, *run.signals), strict=True)]
 
     def _of_kept(self, columns: Array, signals: Sequence[int]) -> Array:
         kept = [0, *(1 + one for one in signals)]
         parts = columns.reshape(*columns.shape[:-1], -1, self.run.count)[..., kept, :]
         return np.asarray(parts.reshape(*columns.shape[:-1], -1))
 
-    def _whitener(self, run: Run, bands: Bands | JointBands) -> Whitener | JointWhitener:
+    def _whitener(self, run: Run, bands: JointBands) -> JointWhitener:
         """The whitening filter for the expected noise."""
-        each = bands.each if isinstance(bands, JointBands) else [bands]
-        found = [Whitener(one, levels) for one, levels in zip(each, self.levels(run, bands), strict=True)]
-        return JointWhitener(found) if isinstance(bands, JointBands) else found[0]
+        return JointWhitener([Whitener(one, levels)
+                              for one, levels in zip(bands.each, self.levels(run, bands), strict=True)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,12 +195,12 @@ class FisherInformation:
 
 def information(linear: LinearModel, changes: Sequence[Array]) -> FisherInformation:
     """Information of the runs of a linear model on effects' changes (m, n) per run."""
-    free, white = linear, linear.whitened(changes)
+    white = linear.whitened(changes)
     each, costs = [], []
     for size in SIZES:
-        there = free.with_size(with_larger_errors(free.size, size))
+        there = linear.with_size(with_larger_errors(linear.size, size))
         found = there.information(white)
-        found[: free.count, : free.count] -= np.diag(free.prior.precision)
+        found[: linear.count, : linear.count] -= np.diag(linear.prior.precision)
         each.append(found)
         costs.append(there.occam_factor)
     return FisherInformation(np.array(each), np.array(costs))

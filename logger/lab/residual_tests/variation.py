@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from logger.identification.noise_models import LAGS
+from logger.identification.noise_models import LAGS, autocorrelations
 from logger.lab.residual_tests.tests import (
     LEAST_GROWTH,
     ResidualEvidence,
@@ -12,7 +12,7 @@ from logger.lab.residual_tests.tests import (
     ResidualTestResult,
     ResidualTests,
 )
-from logger.lab.residuals.block_statistics import autocorrelations, block_means, rank_correlation
+from logger.lab.residuals.block_statistics import block_means, rank_correlation
 from logger.runs import short_names
 
 

@@ -40,12 +40,6 @@ def rank_correlation(one: Array, other: Array) -> tuple[float, float]:
     return float(found.statistic), float(found.pvalue)
 
 
-def autocorrelations(signals: Sequence[Array], lags: int) -> Array:
-    """Correlations of the samples of signals [(n,), ...] that lie 1 ... lags apart (lags,)."""
-    power = sum(float(one @ one) for one in signals) or 1.0
-    return np.array([sum(float(one[lag:] @ one[:-lag]) for one in signals) for lag in range(1, lags + 1)]) / power
-
-
 def band_pass(signal: Array, low_hz: float, high_hz: float, rate_hz: float) -> Array:
     """A signal (n,) without the frequencies outside of a band."""
     f_hz = np.fft.rfftfreq(len(signal), 1 / rate_hz)

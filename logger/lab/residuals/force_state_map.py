@@ -17,7 +17,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from logger.arrays import Array
-from logger.identification.noise_models import autocorrelation
+from logger.dsp.linear_prediction import levinson
+from logger.identification.noise_models import autocorrelation, autocorrelations
 from logger.lab.residuals.breakdown import ModelResiduals
 from logger.runs import SENSOR
 from logger.simulation.virtual_drive import output_of
@@ -86,17 +87,12 @@ def force_map(residuals: ModelResiduals) -> ForceMap:
                     term(lambda travel, _: travel**3))
 
 
-def _whitening(residual: Sequence[Array], order: int = 12) -> Array:
-    """Filter (order + 1,) that makes residuals [(n,), ...] white, by Yule and Walker; [1] for residuals that are white.
-    """
+def _whitening(residual: Sequence[Array]) -> Array:
+    """Filter (13,) that makes residuals [(n,), ...] white, by Yule and Walker; [1] for residuals that are white."""
     if autocorrelation(residual, 0).passed:
         return np.ones(1)
-    count = sum(map(len, residual))
-    lags = np.array([sum(float(one[: len(one) - lag] @ one[lag:]) for one in residual) / count
-                     for lag in range(order + 1)])
-    lags[0] *= 1 + 1e-6
-    table = lags[np.abs(np.arange(order)[:, None] - np.arange(order))]
-    return np.concatenate([[1.0], -np.linalg.solve(table, lags[1:])])
+    taps = levinson(np.concatenate([[1 + 1e-6], autocorrelations(residual, 12)])).taps
+    return taps / taps[0]
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ from logger.lab.likelihood.noise_floor import NoiseLevel
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.priors import UNUSUAL_SIGMA
 from logger.lab.likelihood.signals import JointBands
-from logger.lab.likelihood.whittle import UNEXPLAINED, Bands
+from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.residuals.removed import removed_from
 from logger.lab.residuals.unexplained import Shape, shape_of
 
@@ -30,34 +30,29 @@ COLOUR = frozenset({"whiteness", "frequency"})
 
 def is_coloured_noise(posterior: Posterior, state: State) -> bool:
     """Whether what a fitted state leaves is noise of a colour, as ``coloured_noise`` finds it."""
-    bands = posterior.bands
-    if any(not isinstance(one, Bands) for one in bands):
-        return False
     # That hardly any of it may grow with the motion is computed at once; tests of it take longer.
+    bands = posterior.bands
     if _steady_noise(bands, posterior.residuals(state), state.predictions) is None:
         return False
     shape = shape_of(posterior, state, removed_from(posterior, state.predictions, state))
     return coloured_noise(bands, shape) is not None
 
 
-def coloured_noise(every: Sequence[Bands | JointBands], shape: Shape) -> NoiseLevel | None:
-    """The noise of a residual that has a colour; None where it may be more than that, or the runs do not show it.
-
-    every    the bands of each run; those of one signal, the same in all runs, are asked for
-    """
-    bands = [one for one in every if isinstance(one, Bands)]
-    if len(bands) < len(every) or _is_related(shape):
+def coloured_noise(every: Sequence[JointBands], shape: Shape) -> NoiseLevel | None:
+    """The noise of a residual that has a colour, by the bands of each run; None where it may be more than that, or the
+    runs do not show it."""
+    if _is_related(shape):
         return None
     residuals = shape.residuals
-    return _steady_noise(bands, _whole(residuals.residual, bands), _whole(residuals.model, bands))
+    return _steady_noise(every, _whole(residuals.residual, every), _whole(residuals.model, every))
 
 
-def _steady_noise(every: Sequence[Bands | JointBands], residual: Sequence[Array], model: Sequence[Array]
+def _steady_noise(every: Sequence[JointBands], residual: Sequence[Array], model: Sequence[Array]
                   ) -> NoiseLevel | None:
     """The noise of residuals (n,) per run that fall or rise with frequency and surely do not grow with a model's motion
-    (n,)."""
-    bands = [one for one in every if isinstance(one, Bands)]
-    if len({one.edges_hz.tobytes() for one in bands}) > 1:
+    (n,); None as well where there are several signals, or runs are compared in several bands."""
+    bands = [one for run in every for one in run.each]
+    if len(bands) > len(every) or len({one.edges_hz.tobytes() for one in bands}) > 1:
         return None
     power, motion = (np.concatenate([one.block_powers(samples) for one, samples in zip(bands, some, strict=True)])
                      for some in (residual, model))
@@ -99,6 +94,6 @@ def _is_related(shape: Shape) -> bool:
     return line or any(one.name not in COLOUR for one in shape.tests.found)
 
 
-def _whole(parts: Sequence[Array], bands: Sequence[Bands]) -> list[Array]:
+def _whole(parts: Sequence[Array], bands: Sequence[JointBands]) -> list[Array]:
     """Samples that count of each run, as of all of it."""
-    return [np.concatenate([np.zeros(one.first), part]) for part, one in zip(parts, bands, strict=True)]
+    return [np.concatenate([np.zeros(one.each[0].first), part]) for part, one in zip(parts, bands, strict=True)]
