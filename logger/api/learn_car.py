@@ -42,17 +42,7 @@ from logger.printable import counted
 from logger.runs import READING
 from logger.service.config import Config
 from logger.shipped import vehicle_names, vehicle_path
-from logger.store.formats import vehicle_file
-from logger.store.formats.drive_file import (
-    DISTANCE,
-    DRIVE,
-    SPEED,
-    Drive,
-    drive_of,
-    facts_beside,
-    header_of,
-    read_columns,
-)
+from logger.store.formats import drive_file, vehicle_file
 from logger.store.formats.record_file import TIME, VERTICAL, even_rate_hz
 from logger.store.formats.vehicle_file import CarModel, write_model
 from logger.store.log.log_name import LogName, OwnFile, inside_of
@@ -136,7 +126,7 @@ class LearnedVehicle(CommandResult):
 # --- drives ---
 
 
-def read_drives(source: Drive | Path | str, tell: Any) -> list[Drive]:
+def read_drives(source: drive_file.Drive | Path | str, tell: Any) -> list[drive_file.Drive]:
     """The drives of a dump, a run or a phone's recording. BadInput for one that cannot be read."""
     if not isinstance(source, str | Path):
         return [source]
@@ -145,7 +135,7 @@ def read_drives(source: Drive | Path | str, tell: Any) -> list[Drive]:
         raise BadInput(f"{path}: expected a dump, a run's folder or a recording of a phone, found no such file")
     if path.name.endswith((".dump", ".dump.gz")):
         return even_drives(recorded_dump(path, None, GENERIC, tell), path)
-    if path.name == DRIVE or (path / DRIVE).exists() or _is_drive(path):
+    if path.name == drive_file.DRIVE or (path / drive_file.DRIVE).exists() or _is_drive(path):
         return [_read_run(path)]
     return even_drives(recorded_csv(path, CsvSettings(), Config(), tell), path)
 
@@ -155,20 +145,21 @@ def _is_drive(path: Path) -> bool:
     if not path.is_file():
         return False
     try:
-        return {SPEED, VERTICAL} <= set(header_of(path))
+        return {drive_file.SPEED, VERTICAL} <= set(drive_file.header_of(path))
     except BadInput:
         return False
 
 
-def _read_run(path: Path) -> Drive:
+def _read_run(path: Path) -> drive_file.Drive:
     """A run whose distance may be missing."""
-    table = path / DRIVE if path.is_dir() else path
-    file, columns = read_columns(table, timed=True, more=(SPEED,))
-    drive = drive_of(path, even_rate_hz(columns[TIME], file), {DISTANCE: columns[SPEED], **columns})
-    return replace(drive, facts=facts_beside(table))
+    table = path / drive_file.DRIVE if path.is_dir() else path
+    file, columns = drive_file.read_columns(table, timed=True, more=(drive_file.SPEED,))
+    drive = drive_file.drive_of(path, even_rate_hz(columns[TIME], file),
+                                {drive_file.DISTANCE: columns[drive_file.SPEED], **columns})
+    return replace(drive, facts=drive_file.facts_beside(table))
 
 
-def spectra_of(drive: Drive) -> DriveSpectra:
+def spectra_of(drive: drive_file.Drive) -> DriveSpectra:
     """The blocks of a drive, with what is known of its sensor."""
     facts = drive.facts
     known = [one for one in (facts.noise_mps2, facts.step_mps2 and facts.step_mps2 / 12**0.5) if one]
@@ -190,7 +181,7 @@ class _Used:
     vehicle: str = ""  # that the settings named, where it is known
 
 
-def _of_logs(source: Drive | Path | str) -> list[_Used] | None:
+def _of_logs(source: drive_file.Drive | Path | str) -> list[_Used] | None:
     """What the sidecars of a log, or of a folder of logs, keep of their drives; None where there are no logs. BadInput
     where they keep nothing."""
     if not isinstance(source, str | Path):

@@ -20,17 +20,7 @@ from logger.api.shown import CommandResult
 from logger.chart_data import Array, Chart, Curves, Line
 from logger.comfort.iso2631 import comfort_word
 from logger.errors import BadInput
-from logger.exchange.layer import (
-    Attribute,
-    Feature,
-    Kind,
-    Layer,
-    chained,
-    geometries,
-    group_name,
-    iri_title,
-    write_layer,
-)
+from logger.exchange import layer
 from logger.left_out import left_out_json, left_out_paragraph
 from logger.printable import counted
 from logger.records import WindowRecord
@@ -88,11 +78,11 @@ class Sections(CommandResult):
 
     def write(self, path: Path, option: str = "--out") -> None:
         """Write the rows in the format of the file's ending."""
-        write_layer(self.layer(), path)
+        layer.write_layer(self.layer(), path)
 
-    def layer(self) -> Layer:
+    def layer(self) -> layer.Layer:
         """Rows with places, for the formats of ``convert``; ``t_utc`` is when the first window of each began."""
-        return Layer("sections", FIELDS, tuple(feature for one in self._drives for feature in _features(one)))
+        return layer.Layer("sections", FIELDS, tuple(feature for one in self._drives for feature in _features(one)))
 
 
 def sections_of(question: SectionsQuestion) -> Sections:
@@ -349,25 +339,26 @@ def section_values(one: DriveSections) -> Iterator[dict[str, Any]]:
                "comfort": None if a_w is None else comfort_word(a_w)}
 
 
-_KINDS = {"distance_start_m": Kind.NUMBER, "distance_end_m": Kind.NUMBER, "known_m": Kind.NUMBER,
-          "iri_m_per_km": Kind.NUMBER, "iri_std_m_per_km": Kind.NUMBER, "a_w_mps2": Kind.NUMBER,
-          "speed_mps": Kind.NUMBER, "worst_m_per_km": Kind.NUMBER, "worst_at_m": Kind.NUMBER,
-          "condition": Kind.WORDS, "comfort": Kind.WORDS}
-FIELDS = (Attribute("log", Kind.WORDS), Attribute("drive", Kind.COUNT), Attribute("t_utc", Kind.TIME),
-          Attribute("direction", Kind.WORDS),
-          *(Attribute(name, kind) for name, kind in _KINDS.items()))
+_KINDS = {"distance_start_m": layer.Kind.NUMBER, "distance_end_m": layer.Kind.NUMBER, "known_m": layer.Kind.NUMBER,
+          "iri_m_per_km": layer.Kind.NUMBER, "iri_std_m_per_km": layer.Kind.NUMBER, "a_w_mps2": layer.Kind.NUMBER,
+          "speed_mps": layer.Kind.NUMBER, "worst_m_per_km": layer.Kind.NUMBER, "worst_at_m": layer.Kind.NUMBER,
+          "condition": layer.Kind.WORDS, "comfort": layer.Kind.WORDS}
+FIELDS = (layer.Attribute("log", layer.Kind.WORDS), layer.Attribute("drive", layer.Kind.COUNT),
+          layer.Attribute("t_utc", layer.Kind.TIME),
+          layer.Attribute("direction", layer.Kind.WORDS),
+          *(layer.Attribute(name, kind) for name, kind in _KINDS.items()))
 
 
-def _features(drive: DriveSections) -> Iterator[Feature]:
-    lines = geometries(drive.records)
+def _features(drive: DriveSections) -> Iterator[layer.Feature]:
+    lines = layer.geometries(drive.records)
     section = np.searchsorted(drive.figures.edges_m, drive.middle_m, side="right") - 1
     for index, values in enumerate(section_values(drive)):
         inside = np.flatnonzero(section == index).tolist()
-        geometry = chained([lines[row][0] for row in inside])
+        geometry = layer.chained([lines[row][0] for row in inside])
         began = iso_utc(drive.records[inside[0]].utc_us) if inside else None
         places = [place for line in geometry for place in line]
-        yield Feature(
-            group_name(drive.log, drive.number), iri_title(values["iri_m_per_km"]),
+        yield layer.Feature(
+            layer.group_name(drive.log, drive.number), layer.iri_title(values["iri_m_per_km"]),
             (drive.log, drive.number, began, drive.direction or None, *(values[name] for name in _KINDS)), geometry,
             places[len(places) // 2] if places else None, began,
             bool(inside) and index > 0 and lines[inside[0]][1],

@@ -23,29 +23,8 @@ from logger.profiles.track import Track
 from logger.report.quantities import numbers_of
 from logger.roads.iri import doubt_of
 from logger.shipped import vehicle_path
-from logger.simulation.virtual_drive import (
-    SENSOR,
-    FrontAxleMotion,
-    Obstacle,
-    SensorErrors,
-    at_one_speed,
-    motion_along,
-    recorded_drive,
-    standing,
-    with_obstacles,
-)
-from logger.store.formats import profile_file
-from logger.store.formats.drive_file import (
-    COLUMNS,
-    PROFILE,
-    RUN,
-    TIME,
-    read_forces,
-    read_speeds,
-    track_of,
-    write_drive,
-    write_profile,
-)
+from logger.simulation import virtual_drive
+from logger.store.formats import drive_file, profile_file
 from logger.store.formats.effect_file import effect_named
 from logger.store.formats.vehicle_file import CarModel, check_moves_itself, read_model
 from logger.vehicle.compose import Car, with_effect
@@ -64,7 +43,7 @@ def simulated(question: SimulateQuestion) -> Run:
     given = question.profile
     road = given if isinstance(given, profile_file.Wheelpaths) else read_profile(given)
     try:
-        track = with_obstacles(track_of(road), _obstacles(question, ""))
+        track = virtual_drive.with_obstacles(drive_file.track_of(road), _obstacles(question, ""))
         car = car_on(model.vehicle, model.effects, {one.effect.name: name for one in model.effects}, track)
         columns = _columns(question, car, track, _motion(question, car, track), {})
     except ValueError as error:
@@ -100,11 +79,11 @@ class Simulation(CommandResult):
 
     def write(self, path: Path, option: str = "--out") -> None:
         """Write the road, of which the file is called ``profile.csv``, or the drive. BadInput for the road of a rig."""
-        if path.name != PROFILE:
-            write_drive(path, self.columns)
+        if path.name != drive_file.PROFILE:
+            drive_file.write_drive(path, self.columns)
             self._json["file"] = str(path)
         elif isinstance(self.track, Track):
-            write_profile(path, self.track)
+            drive_file.write_profile(path, self.track)
         else:
             raise BadInput(f"{option} {path}: a rig stands, and has no road")
 
@@ -116,8 +95,8 @@ def simulation(question: SimulateCommand) -> Simulation:
     doubt = ""
     if question.excitation is not None:
         place = question.excitation.parent
-        track: Track | Excitation = profile_file.read_excitation(question.excitation, read_forces(place))
-        check_forces(model.vehicle, track, str(place / RUN))
+        track: Track | Excitation = profile_file.read_excitation(question.excitation, drive_file.read_forces(place))
+        check_forces(model.vehicle, track, str(place / drive_file.RUN))
     else:
         track, doubt = _road(question)
     car = car_on(model.vehicle, effects, said, track)
@@ -132,7 +111,7 @@ def simulation(question: SimulateCommand) -> Simulation:
         raise BadInput(f"{car.vehicle.name}: {error}") from None
     run = _run(Path("drive.csv"), question, columns, None)
     accel, rate_hz = run.accel_z_mps2, question.rate_hz
-    away = COLUMNS[2:] if track.timed else ()
+    away = drive_file.COLUMNS[2:] if track.timed else ()
     way = {} if track.timed else {
         "distance_start_m": float(run.distance_m[0]), "distance_end_m": float(run.distance_m[-1]),
         "speed_mean_mps": float(run.speed_mps.mean())}
@@ -142,10 +121,10 @@ def simulation(question: SimulateCommand) -> Simulation:
         "accel_rms_mps2": float(np.sqrt(np.mean(accel**2))),
         "accel_min_mps2": float(accel.min()), "accel_max_mps2": float(accel.max()),
         "noise_mps2": question.noise_mps2, "step_mps2": question.step_mps2, "seed": question.seed,
-        "more_columns": list(columns)[len(COLUMNS):],
+        "more_columns": list(columns)[len(drive_file.COLUMNS):],
         "effects": [{"effect": one.effect.name, "parameters": dict(one.values)} for one in effects],
     }
-    more = f"; also {', '.join(list(columns)[len(COLUMNS):])}" * (len(columns) > len(COLUMNS))
+    more = f"; also {', '.join(list(columns)[len(drive_file.COLUMNS):])}" * (len(columns) > len(drive_file.COLUMNS))
     for one in effects:
         more += "\n  with " + ", ".join(filter(None, (one.effect.name, numbers_of(one))))
     along = (f"{run.distance_m[0]:.2f} to {run.distance_m[-1]:.2f} m at {run.speed_mps.mean():.2f} m/s on average, "
@@ -158,40 +137,42 @@ def simulation(question: SimulateCommand) -> Simulation:
 
 
 def _columns(question: SimulateQuestion, car: Car, track: Track | Excitation,
-             motion: FrontAxleMotion, outputs: Mapping[str, Output]) -> dict[str, Array]:
+             motion: virtual_drive.FrontAxleMotion, outputs: Mapping[str, Output]) -> dict[str, Array]:
     """What is recorded (n,), by name. ValueError for what no car can do."""
     place = car.vehicle.sensor
-    sensor = {SENSOR: body_point(car.structure, place.ahead_m, place.left_m)}
-    return recorded_drive(car, {**sensor, **outputs}, track.begun(float(motion.time_s[0])), motion,
-                          question.rate_hz, SensorErrors(question.noise_mps2, question.step_mps2, question.seed))
+    sensor = {virtual_drive.SENSOR: body_point(car.structure, place.ahead_m, place.left_m)}
+    return virtual_drive.recorded_drive(
+        car, {**sensor, **outputs}, track.begun(float(motion.time_s[0])), motion, question.rate_hz,
+        virtual_drive.SensorErrors(question.noise_mps2, question.step_mps2, question.seed))
 
 
-def _motion(question: SimulateQuestion, car: Car, track: Track | Excitation) -> FrontAxleMotion:
+def _motion(question: SimulateQuestion, car: Car, track: Track | Excitation) -> virtual_drive.FrontAxleMotion:
     """ValueError for a drive that is too short, too long, or not on the road."""
     speed: Any = question.speed_mps    # at the terminal the name of a file
     if isinstance(track, Excitation):
-        return standing(track, question.rate_hz)
+        return virtual_drive.standing(track, question.rate_hz)
     if isinstance(speed, tuple | list):
         times_s, speeds_mps = speed
         knots = _knots(times_s, speeds_mps, question.name)
     elif isinstance(speed, Path):
-        knots = read_speeds(speed)
+        knots = drive_file.read_speeds(speed)
     else:
-        knots = at_one_speed(track, float(car.structure.behind_m.max()), speed)
-    return motion_along(*knots, track.start_m, question.rate_hz)
+        knots = virtual_drive.at_one_speed(track, float(car.structure.behind_m.max()), speed)
+    return virtual_drive.motion_along(*knots, track.start_m, question.rate_hz)
 
 
 def _run(path: Path, question: SimulateQuestion, columns: Mapping[str, Array], profile: Profile | None) -> Run:
-    time_s, accel_z_mps2, speed_mps, distance_m = (columns[name] for name in (TIME, *COLUMNS[1:]))
+    time_s, accel_z_mps2, speed_mps, distance_m = (columns[name] for name in (drive_file.TIME, *drive_file.COLUMNS[1:]))
     return Run(path, question.rate_hz, time_s, accel_z_mps2, speed_mps, distance_m, None, None, profile)
 
 
-def _obstacles(question: SimulateQuestion, dashes: str) -> list[Obstacle]:
+def _obstacles(question: SimulateQuestion, dashes: str) -> list[virtual_drive.Obstacle]:
     """``dashes``: before the option's name, at the terminal."""
     given = question.obstacles or {}
     if isinstance(given, Mapping):
-        return [Obstacle(kind, values, f"obstacle {kind}") for kind, values in given.items()]
-    return [Obstacle(*named_numbers(text, f"{dashes}obstacle"), f"{dashes}obstacle {text}") for text in given]
+        return [virtual_drive.Obstacle(kind, values, f"obstacle {kind}") for kind, values in given.items()]
+    return [virtual_drive.Obstacle(*named_numbers(text, f"{dashes}obstacle"), f"{dashes}obstacle {text}")
+            for text in given]
 
 
 def _knots(time_s: npt.ArrayLike, speed_mps: npt.ArrayLike, name: str) -> tuple[Array, Array]:
@@ -262,8 +243,8 @@ def _road(question: SimulateCommand) -> tuple[Track, str]:
         track, doubt = Track(given, np.zeros(2)), ""
     else:
         profile = profile_file.read_profile(given, judged=True)
-        track, doubt = track_of(profile), doubt_of(profile.elevation_m, profile.spacing_m)
+        track, doubt = drive_file.track_of(profile), doubt_of(profile.elevation_m, profile.spacing_m)
     try:
-        return with_obstacles(track, _obstacles(question, "--")), doubt
+        return virtual_drive.with_obstacles(track, _obstacles(question, "--")), doubt
     except ValueError as error:
         raise BadInput(str(error)) from None

@@ -23,18 +23,8 @@ from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput, RidelogError
 from logger.files import read_bounded
 from logger.printable import counted, printable
 from logger.service.config import Config, find_config, load_config, load_pairing
+from logger.store.export import sticks
 from logger.store.export.export import ExportResult, Progress, export
-from logger.store.export.sticks import (
-    OFF,
-    PAIRED_NAME,
-    Pairing,
-    StickNote,
-    StickState,
-    read_note,
-    show_on_led,
-    stick_of,
-    write_note,
-)
 from logger.store.formats.yaml_nodes import MAX_BYTES
 from logger.store.log.atomic_file import is_taken
 
@@ -110,10 +100,10 @@ def _may_be_paired(settings: Path, logs: Path) -> bool:
     """False where a logger gives its logs to any stick for sure, though its settings are wrong or gone. What cannot be
     read counts as a pairing: the doubt is the owner's."""
     try:
-        return load_pairing(settings).mode != OFF
+        return load_pairing(settings).mode != sticks.OFF
     except BadInput:
         pass
-    if is_taken(logs / PAIRED_NAME) or is_taken(Pairing().key_file):
+    if is_taken(logs / sticks.PAIRED_NAME) or is_taken(sticks.Pairing().key_file):
         return True
     if not is_taken(settings):
         return False
@@ -159,11 +149,11 @@ class _Board:
         self._note = note
         self._led = led
 
-    def report(self, state: StickState, ok: bool, text: str) -> None:
+    def report(self, state: sticks.StickState, ok: bool, text: str) -> None:
         if self._note is not None:
-            before = read_note(self._note)
+            before = sticks.read_note(self._note)
             try:
-                write_note(self._note, StickNote(stick_of(self._note), state, ok, text))
+                sticks.write_note(self._note, sticks.StickNote(sticks.stick_of(self._note), state, ok, text))
             except OSError as error:
                 print(f"{self._note}: no note can be kept ({error.strerror})", file=sys.stderr)
                 self._note = None
@@ -176,7 +166,7 @@ class _Board:
 
     def unmounted(self, place: Path) -> int:
         """After the unmounting: only now may the stick be pulled."""
-        before = read_note(self._note) if self._note is not None else None
+        before = sticks.read_note(self._note) if self._note is not None else None
         if place.is_mount():
             self.report("unmounting", False, f"{place} is still mounted; shut down before pulling it")
             return EXIT_CHECK_FAILED
@@ -195,4 +185,4 @@ class _Board:
 
     def _show(self) -> None:
         if self._led is not None and self._note is not None:
-            show_on_led(self._led, self._note.parent)
+            sticks.show_on_led(self._led, self._note.parent)

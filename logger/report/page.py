@@ -28,23 +28,7 @@ from logger.chart_data import Array
 from logger.comfort.iso2631 import COMFORT_WORDS
 from logger.printable import counted
 from logger.records import WindowRecord
-from logger.report.document import (
-    EMPTY,
-    Html,
-    asset,
-    bullets,
-    concatenated,
-    data_block,
-    document,
-    grid,
-    heading,
-    hint,
-    html,
-    map_links,
-    paragraphs,
-    section,
-    tiles,
-)
+from logger.report import document as doc
 from logger.report.maps import MapLine
 from logger.report.placed import MOST_ROWS, PlacesPassed, places_passed
 from logger.report.summary import (
@@ -71,7 +55,7 @@ from logger.vehicle.vehicle import GENERIC
 
 SCRIPTS = ("windows.js", "canvas.js", "map.js", "curves.js", "page.js")
 
-_A_W = Html("a<sub>w</sub> [m/s²]")
+_A_W = doc.Html("a<sub>w</sub> [m/s²]")
 
 FLAG_MEANINGS: Mapping[str, str] = {
     "gps_lost": "speed and position were carried through a short loss of the GPS, or are absent",
@@ -94,7 +78,8 @@ FLAG_MEANINGS: Mapping[str, str] = {
 
 
 def page(files: Sequence[LoggedFile], base: Sequence[MapLine] = (), base_name: str = "", tiles_from: str = "",
-         first: Sequence[str] = (), title: tuple[str, str] | None = None, marked: Sequence[int] | None = None) -> Html:
+         first: Sequence[str] = (), title: tuple[str, str] | None = None,
+         marked: Sequence[int] | None = None) -> doc.Html:
     """The page of some log files, in order of their writing, as one HTML document.
 
     base          roads that are drawn beneath, out of a file named ``base_name``
@@ -108,23 +93,23 @@ def page(files: Sequence[LoggedFile], base: Sequence[MapLine] = (), base_name: s
     summary = summarise(records)
     drives = split_drives(records)
     host = "{0.scheme}://{0.netloc}".format(urlsplit(tiles_from)) if tiles_from else ""
-    return document(title[0] if title else f"Road roughness, {date_words(summary)}", [
-        heading(*title) if title else _head(summary, files),
+    return doc.document(title[0] if title else f"Road roughness, {date_words(summary)}", [
+        doc.heading(*title) if title else _head(summary, files),
         _tiles(summary),
         *first,
         track_views(records, summary, _sources(base_name, host), [date_words(summarise(one)) for one in drives]),
         _shares_section(summary),
-        _places_section(records, summary.roughest) if marked is None else EMPTY,
-        _drives_section(drives) if len(drives) > 1 else EMPTY,
+        _places_section(records, summary.roughest) if marked is None else doc.EMPTY,
+        _drives_section(drives) if len(drives) > 1 else doc.EMPTY,
         _notes_section(summary, files),
         _settings_section(files),
         windows_table(records),
-        data_block("data", track_data(drives, base, places_passed(drives)) | {
+        doc.data_block("data", track_data(drives, base, places_passed(drives)) | {
             "places": _numbers(records, summary.roughest) if marked is None else list(marked),
             "tiles": tiles_from, "meanings": FLAG_MEANINGS,
             "names": {"iri": [class_words(letter) for letter in IRI_CLASSES],
                       "comfort": [comfort_words(name) for name in COMFORT_NAMES]}}),
-    ], style=asset("page.css"), script='"use strict";\n' + "".join(map(asset, SCRIPTS)), images_from=host)
+    ], style=doc.asset("page.css"), script='"use strict";\n' + "".join(map(doc.asset, SCRIPTS)), images_from=host)
 
 
 def _sources(base_name: str, host: str) -> str:
@@ -134,7 +119,7 @@ def _sources(base_name: str, host: str) -> str:
     return ". ".join([*shown, "Where they are OpenStreetMap's: © OpenStreetMap contributors"]) if shown else ""
 
 
-def _head(summary: DriveSummary, files: Sequence[LoggedFile]) -> Html:
+def _head(summary: DriveSummary, files: Sequence[LoggedFile]) -> doc.Html:
     sidecar = next((file.sidecar for file in files if file.sidecar), {})
     vehicle = _inside(sidecar, "vehicle", "name")
     version = _inside(sidecar, "ridelog_version")
@@ -142,53 +127,53 @@ def _head(summary: DriveSummary, files: Sequence[LoggedFile]) -> Html:
     words += [f"vehicle {vehicle}"] if vehicle else []
     words += [f"ridelog {version}"] if version else []
     what = "Road roughness of a drive" if summary.drives == 1 else f"Road roughness of {summary.drives} drives"
-    return heading(what, " · ".join(words))
+    return doc.heading(what, " · ".join(words))
 
 
-def _tiles(summary: DriveSummary) -> Html:
-    return tiles([
+def _tiles(summary: DriveSummary) -> doc.Html:
+    return doc.tiles([
         ("Distance", distance_words(summary.distance_m), ""),
         ("Time", span_words(summary.duration_s), ""),
         ("Mean speed", _number(summary.mean_speed_mps, 0, factor=3.6), "km/h"),
         ("Mean roughness (IRI)", _number(summary.mean_iri_m_per_km, 1), "m/km"),
-        (Html("Comfort inside (a<sub>w</sub>)"), _number(summary.a_w_mps2, 2), "m/s²"),
+        (doc.Html("Comfort inside (a<sub>w</sub>)"), _number(summary.a_w_mps2, 2), "m/s²"),
     ])
 
 
-def _shares_section(summary: DriveSummary) -> Html:
-    return html('<section class="columns"><div><h2>Road by IRI (classes of ISO 8608)</h2>{}</div><div>'
-                "<h2>Road by comfort</h2>{}</div></section>",
-                _shares(summary.iri_classes, tuple(IRI_CLASSES), class_words),
-                _shares(summary.comfort, COMFORT_NAMES, comfort_words))
+def _shares_section(summary: DriveSummary) -> doc.Html:
+    return doc.html('<section class="columns"><div><h2>Road by IRI (classes of ISO 8608)</h2>{}</div><div>'
+                    "<h2>Road by comfort</h2>{}</div></section>",
+                    _shares(summary.iri_classes, tuple(IRI_CLASSES), class_words),
+                    _shares(summary.comfort, COMFORT_NAMES, comfort_words))
 
 
-def _shares(shares: Sequence[Share], names: tuple[str, ...], words_of: Callable[[str], str]) -> Html:
+def _shares(shares: Sequence[Share], names: tuple[str, ...], words_of: Callable[[str], str]) -> doc.Html:
     if not shares:
-        return Html('<p class="empty">No distance was measured.</p>')
-    return html("<table>{}</table>", concatenated(
-        html('<tr><td>{0}</td><td class="bar"><span class="f{1}" style="width:{2:.1%}"></span></td>'
-             '<td class="n">{2:.1%}</td><td class="n">{3}</td></tr>', words_of(share.name),
-             rank(share.name, names), share.share, distance_words(share.distance_m)) for share in shares))
+        return doc.Html('<p class="empty">No distance was measured.</p>')
+    return doc.html("<table>{}</table>", doc.concatenated(
+        doc.html('<tr><td>{0}</td><td class="bar"><span class="f{1}" style="width:{2:.1%}"></span></td>'
+                 '<td class="n">{2:.1%}</td><td class="n">{3}</td></tr>', words_of(share.name),
+                 rank(share.name, names), share.share, distance_words(share.distance_m)) for share in shares))
 
 
-def _places_section(records: Sequence[WindowRecord], places: Sequence[RoughWindow]) -> Html:
+def _places_section(records: Sequence[WindowRecord], places: Sequence[RoughWindow]) -> doc.Html:
     rows = [(number_button(index, number), str(place.drive), _instant(place.utc_us), _geo(place),
              distance_words(place.along_m), iri_words(place), _number(place.speed_mps, 0, factor=3.6),
              _number(place.a_w_mps2, 2), comfort_words(place.comfort), " ".join(place.flags))
             for number, (index, place) in enumerate(zip(_numbers(records, places), places, strict=True), start=1)]
     if not rows:
-        return EMPTY
+        return doc.EMPTY
     heads = ("#", "Drive", "When (UTC)", "Coordinates", "Distance", "IRI [m/km]", "Speed [km/h]", _A_W, "Comfort",
              "Flags")
-    return section("Roughest places", html(
-        '<div id="places">{}</div>', grid(heads, rows, words=(0, 1, 2, 3, 8, 9))) + hint(
+    return doc.section("Roughest places", doc.html(
+        '<div id="places">{}</div>', doc.grid(heads, rows, words=(0, 1, 2, 3, 8, 9))) + doc.hint(
         "Each the worst window within 50 m, with its standard error. A single window of some metres is an estimate: "
         "visit a place before judging it. Its number shows it on the map and in the curves."))
 
 
-def number_button(row: int, number: int) -> Html:
+def number_button(row: int, number: int) -> doc.Html:
     """The number of a place, which shows its row on the map and in the curves."""
-    return html('<button type="button" data-window="{}">{}</button>', row, str(number))
+    return doc.html('<button type="button" data-window="{}">{}</button>', row, str(number))
 
 
 def _numbers(records: Sequence[WindowRecord], places: Sequence[RoughWindow]) -> list[int]:
@@ -197,17 +182,18 @@ def _numbers(records: Sequence[WindowRecord], places: Sequence[RoughWindow]) -> 
     return [rows[place.along_m, place.iri_m_per_km] for place in places]
 
 
-def _geo(place: RoughWindow) -> Html | str:
+def _geo(place: RoughWindow) -> doc.Html | str:
     if place.lat_deg is None or place.lon_deg is None:
         return "not known"
-    return map_links(place.lat_deg, place.lon_deg, place_words(place))
+    return doc.map_links(place.lat_deg, place.lon_deg, place_words(place))
 
 
-def _drives_section(drives: Sequence[Sequence[WindowRecord]]) -> Html:
+def _drives_section(drives: Sequence[Sequence[WindowRecord]]) -> doc.Html:
     rows = [(str(number), date_words(one), distance_words(one.distance_m), span_words(one.duration_s),
              _number(one.mean_iri_m_per_km, 1), _number(one.a_w_mps2, 2))
             for number, one in enumerate(map(summarise, drives), start=1)]
-    return section("Drives", grid(("#", "When", "Distance", "Time", "Mean IRI [m/km]", _A_W), rows, words=(0, 1)))
+    return doc.section("Drives",
+                       doc.grid(("#", "When", "Distance", "Time", "Mean IRI [m/km]", _A_W), rows, words=(0, 1)))
 
 
 def notices(files: Sequence[LoggedFile]) -> list[str]:
@@ -218,7 +204,7 @@ def notices(files: Sequence[LoggedFile]) -> list[str]:
     return [not_known(max(known))] if known else []
 
 
-def _notes_section(summary: DriveSummary, files: Sequence[LoggedFile]) -> Html:
+def _notes_section(summary: DriveSummary, files: Sequence[LoggedFile]) -> doc.Html:
     notes = [_sensor_note(sidecar) for sidecar in _different(_inside(file.sidecar or {}, "sensor") for file in files)]
     missing = [file.name for file in files if file.sidecar is None]
     lost = [file.name for file in files if _inside(file.sidecar or {}, "settings_lost") is True]
@@ -237,13 +223,13 @@ def _notes_section(summary: DriveSummary, files: Sequence[LoggedFile]) -> Html:
     notes.append(f"{counted(summary.windows, 'window')} from {counted(len(files), 'log file')}")
     rows = [(flag, str(count), f"{count / summary.windows:.1%}", FLAG_MEANINGS.get(flag, ""))
             for flag, count in summary.flags.items()]
-    flags = (grid(("Flag", "Windows", "Share", "Meaning"), rows, words=(0, 3)) if rows
-             else paragraphs(["No window carries a flag."]))
-    return section("How far to trust it", flags + bullets(notes, style="notes"))
+    flags = (doc.grid(("Flag", "Windows", "Share", "Meaning"), rows, words=(0, 3)) if rows
+             else doc.paragraphs(["No window carries a flag."]))
+    return doc.section("How far to trust it", flags + doc.bullets(notes, style="notes"))
 
 
-def _warning(text: str) -> Html:
-    return html('<span class="warn">{}</span>', text)
+def _warning(text: str) -> doc.Html:
+    return doc.html('<span class="warn">{}</span>', text)
 
 
 def _sensor_note(sensor: Any) -> str:
@@ -256,15 +242,15 @@ def _sensor_note(sensor: Any) -> str:
                                           "here.")
 
 
-def _settings_section(files: Sequence[LoggedFile]) -> Html:
+def _settings_section(files: Sequence[LoggedFile]) -> doc.Html:
     most, most_characters = 10, 20_000
     different = _different({key: value for key, value in file.sidecar.items() if key not in ("log", "clock_map")}
                            for file in files if file.sidecar)
     if not different:
-        return EMPTY
+        return doc.EMPTY
     texts = [json.dumps(content, indent=2, ensure_ascii=False) for content in different[:most]]
-    blocks = concatenated(html("<pre>{}</pre>", text[:most_characters]) for text in texts)
-    return html("<details><summary>Settings, vehicle and versions</summary>{}</details>", blocks)
+    blocks = doc.concatenated(doc.html("<pre>{}</pre>", text[:most_characters]) for text in texts)
+    return doc.html("<details><summary>Settings, vehicle and versions</summary>{}</details>", blocks)
 
 
 def _number(value: float | None, decimals: int, factor: float = 1.0) -> str:
@@ -295,7 +281,8 @@ _MODES = (("iri", "Roughness"), ("comfort", "Comfort"), ("trust", "Flags"))
 _TRUST = (("0", "no flag"), ("3", "a flag, and a value"), ("x", "no value, or one that no mean includes"))
 
 
-def track_views(records: Sequence[WindowRecord], summary: DriveSummary, sources: str, drives: Sequence[str]) -> Html:
+def track_views(records: Sequence[WindowRecord], summary: DriveSummary, sources: str,
+                drives: Sequence[str]) -> doc.Html:
     """The map and the curves, which the script draws, and what it says of them.
 
     sources    whose pictures and roads the map shows
@@ -303,23 +290,24 @@ def track_views(records: Sequence[WindowRecord], summary: DriveSummary, sources:
     """
     placed = any(record.lat_deg is not None and record.lon_deg is not None for record in records)
     if not placed and not summary.distance_m > 0:
-        return section("Along the road", Html('<p class="empty">No row has a position or a distance: there is neither '
+        return doc.section("Along the road",
+                           doc.Html('<p class="empty">No row has a position or a distance: there is neither '
                                              "map nor curve.</p>"))
     parts = [_map_view(summary, sources, drives) if placed else
-             Html('<p class="empty">No row has a position, so there is no map.</p>')]
+             doc.Html('<p class="empty">No row has a position, so there is no map.</p>')]
     parts += [_curves_view()] if summary.distance_m > 0 else []
-    return html('<section id="views" data-mode="iri"><h2>Along the road</h2><noscript><p class="warn">The map, the '
-                "curves and the table of windows are drawn by a script, which this browser does not run.</p>"
-                "</noscript>{}{}</section>", concatenated(parts), _READOUT)
+    return doc.html('<section id="views" data-mode="iri"><h2>Along the road</h2><noscript><p class="warn">The map, the '
+                    "curves and the table of windows are drawn by a script, which this browser does not run.</p>"
+                    "</noscript>{}{}</section>", doc.concatenated(parts), _READOUT)
 
 
-def _choice(drives: Sequence[str]) -> Html:
+def _choice(drives: Sequence[str]) -> doc.Html:
     if len(drives) < 2:
-        return EMPTY
-    options = concatenated(html('<option value="{}">Drive {}: {}</option>', number, number + 1, when)
-                           for number, when in enumerate(drives))
-    return html('<label class="choice">Show <select id="only"><option value="-1">all drives</option>{}</select>'
-                "</label>", options)
+        return doc.EMPTY
+    options = doc.concatenated(doc.html('<option value="{}">Drive {}: {}</option>', number, number + 1, when)
+                               for number, when in enumerate(drives))
+    return doc.html('<label class="choice">Show <select id="only"><option value="-1">all drives</option>{}</select>'
+                    "</label>", options)
 
 
 def _repeated_words(windows: int) -> str:
@@ -329,39 +317,39 @@ def _repeated_words(windows: int) -> str:
             "single drive, or let ridelog passes average them.")
 
 
-def _map_view(summary: DriveSummary, sources: str, drives: Sequence[str]) -> Html:
-    buttons = concatenated(html('<button type="button" data-mode="{}" aria-pressed="{}">{}</button>', name,
-                                "true" if name == "iri" else "false", words) for name, words in _MODES)
-    trust = concatenated(html('<li><i class="f{}"></i>{}</li>', *entry) for entry in _TRUST)
-    repeated = hint(_repeated_words(summary.windows)) if len(drives) > 1 else EMPTY
-    return html('<div class="above"><div class="switch" role="group" aria-label="What the colours of the map show">'
-                "{}</div>{}</div>"
-                '<div class="picture" id="map"><canvas tabindex="0" role="application" aria-label="Map of the road. '
-                "Arrow keys move it, plus and minus zoom, 0 shows all. The table of all windows below holds the same "
-                'values."></canvas><canvas class="over" aria-hidden="true"></canvas><div class="zoom">'
-                '<button type="button" data-zoom="in" aria-label="Zoom in">+</button>'
-                '<button type="button" data-zoom="out" aria-label="Zoom out">−</button>'
-                '<button type="button" data-zoom="all" aria-label="Show the whole way">⤢</button></div></div>'
-                '{}{}<ul class="legend by-trust">{}</ul>{}{}', buttons, _choice(drives),
-                _legend("by-iri", summary.iri_classes, tuple(IRI_CLASSES), class_words),
-                _legend("by-comfort", summary.comfort, COMFORT_NAMES, comfort_words), trust, repeated,
-                hint(sources) if sources else EMPTY)
+def _map_view(summary: DriveSummary, sources: str, drives: Sequence[str]) -> doc.Html:
+    buttons = doc.concatenated(doc.html('<button type="button" data-mode="{}" aria-pressed="{}">{}</button>', name,
+                                        "true" if name == "iri" else "false", words) for name, words in _MODES)
+    trust = doc.concatenated(doc.html('<li><i class="f{}"></i>{}</li>', *entry) for entry in _TRUST)
+    repeated = doc.hint(_repeated_words(summary.windows)) if len(drives) > 1 else doc.EMPTY
+    return doc.html('<div class="above"><div class="switch" role="group" aria-label="What the colours of the map show">'
+                    "{}</div>{}</div>"
+                    '<div class="picture" id="map"><canvas tabindex="0" role="application" aria-label="Map of the '
+                    "road. Arrow keys move it, plus and minus zoom, 0 shows all. The table of all windows below holds "
+                    'the same values."></canvas><canvas class="over" aria-hidden="true"></canvas><div class="zoom">'
+                    '<button type="button" data-zoom="in" aria-label="Zoom in">+</button>'
+                    '<button type="button" data-zoom="out" aria-label="Zoom out">−</button>'
+                    '<button type="button" data-zoom="all" aria-label="Show the whole way">⤢</button></div></div>'
+                    '{}{}<ul class="legend by-trust">{}</ul>{}{}', buttons, _choice(drives),
+                    _legend("by-iri", summary.iri_classes, tuple(IRI_CLASSES), class_words),
+                    _legend("by-comfort", summary.comfort, COMFORT_NAMES, comfort_words), trust, repeated,
+                    doc.hint(sources) if sources else doc.EMPTY)
 
 
-def _curves_view() -> Html:
-    return Html('<div class="picture" id="curves"><canvas tabindex="0" role="application" aria-label="Curves '
-                "of roughness, weighted acceleration and speed along the road. Left and right go from window "
-                "to window, with Shift they choose a range; plus and minus zoom, 0 shows all. The table of all "
-                'windows below holds the same values."></canvas><canvas class="over" aria-hidden="true"></canvas>'
-                "</div>") + hint(
-        "The shaded band is the IRI plus and minus its standard error. Where many windows share a pixel of the "
-        "picture, the line is their mean, weighted by length, the band the mean error of one window, and a grey stroke "
-        "reaches up to the worst of them. Dotted: lower limits of the IRI classes, and of discomfort (fairly, very, "
-        "extreme). The strip at the bottom: orange where a window carries a flag, grey where it has no value that "
-        "counts.")
+def _curves_view() -> doc.Html:
+    return doc.Html('<div class="picture" id="curves"><canvas tabindex="0" role="application" aria-label="Curves '
+                    "of roughness, weighted acceleration and speed along the road. Left and right go from window "
+                    "to window, with Shift they choose a range; plus and minus zoom, 0 shows all. The table of all "
+                    'windows below holds the same values."></canvas><canvas class="over" aria-hidden="true"></canvas>'
+                    "</div>") + doc.hint(
+            "The shaded band is the IRI plus and minus its standard error. Where many windows share a pixel of the "
+            "picture, the line is their mean, weighted by length, the band the mean error of one window, and a grey "
+            "stroke reaches up to the worst of them. Dotted: lower limits of the IRI classes, and of discomfort "
+            "(fairly, very, extreme). The strip at the bottom: orange where a window carries a flag, grey where it has "
+            "no value that counts.")
 
 
-_READOUT = Html(
+_READOUT = doc.Html(
     '<div class="readout"><div id="reading" aria-live="polite"><p class="hint">Point at a window, or tap it. Drag over '
     'the curves for the figures of a range.</p></div><div id="range" hidden><div id="figures" aria-live="polite"></div>'
     '<p class="actions"><button type="button" id="range-look">Look at it</button>'
@@ -369,25 +357,26 @@ _READOUT = Html(
     '<button type="button" id="range-clear">Forget the range</button></p></div></div>')
 
 
-def _legend(name: str, shares: Sequence[Share], names: tuple[str, ...], words_of: Callable[[str], str]) -> Html:
+def _legend(name: str, shares: Sequence[Share], names: tuple[str, ...], words_of: Callable[[str], str]) -> doc.Html:
     shown = {share.name for share in shares}
     ranks = [number for number, one in enumerate(names) if one in shown]
     shown |= set(names[min(ranks): max(ranks)]) if ranks else set()  # a mean of windows may lie between their classes
-    entries = concatenated(html('<li><i class="f{}"></i>{}</li>', rank(one, names), words_of(one))
-                           for one in sorted(shown, key=lambda one: names.index(one) if one in names else len(names)))
-    return html('<ul class="legend {}">{}</ul>', name, entries)
+    entries = doc.concatenated(doc.html('<li><i class="f{}"></i>{}</li>', rank(one, names), words_of(one))
+                               for one in sorted(shown, key=lambda one: names.index(one) if one in names
+                                                 else len(names)))
+    return doc.html('<ul class="legend {}">{}</ul>', name, entries)
 
 
-def windows_table(records: Sequence[WindowRecord]) -> Html:
+def windows_table(records: Sequence[WindowRecord]) -> doc.Html:
     """Every row, as a table of which the script shows some at a time: it stands behind the map and the curves."""
     names = ("drive", "row", "time UTC", "from [m]", "lat", "lon", "km/h", "IRI [m/km]", "±", "a_w [m/s²]",
              "MTVV [m/s²]", "VDV [m/s^1.75]", "crest", "class", "comfort", "flags")
-    head = concatenated(html('<th scope="col">{}</th>', name) for name in names)
-    turns = concatenated(html('<button type="button" data-turn="{}">{}</button>', *turn) for turn in (
+    head = doc.concatenated(doc.html('<th scope="col">{}</th>', name) for name in names)
+    turns = doc.concatenated(doc.html('<button type="button" data-turn="{}">{}</button>', *turn) for turn in (
         ("first", "First"), ("-1", "Previous"), ("1", "Next"), ("last", "Last")))
-    return html('<details class="rows"><summary>All windows ({})</summary><div class="scroll"><table><thead><tr>{}</tr>'
-                '</thead><tbody id="rows"></tbody></table></div><p class="actions">{}<span id="rows-of" '
-                'aria-live="polite"></span></p></details>', len(records), head, turns)
+    return doc.html('<details class="rows"><summary>All windows ({})</summary><div class="scroll"><table><thead>'
+                    '<tr>{}</tr></thead><tbody id="rows"></tbody></table></div><p class="actions">{}<span id="rows-of" '
+                    'aria-live="polite"></span></p></details>', len(records), head, turns)
 
 
 def rank(name: str, names: tuple[str, ...]) -> str:

@@ -7,21 +7,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
+from logger.report import document as doc
 from logger.report.charts import chart
-from logger.report.document import (
-    EMPTY,
-    Html,
-    bullets,
-    concatenated,
-    document,
-    grid,
-    heading,
-    hint,
-    html,
-    paragraphs,
-    section,
-    tiles,
-)
 from logger.studies.all_studies import Carried
 from logger.studies.study import DISSERTATION, Item, Picture, Result, Study, Table, Word, word_of
 
@@ -37,36 +24,36 @@ _INDEX_STYLE = _STYLE + (
 """On a phone each study is a block, as a row of five columns does not fit."""
 
 
-def page(study: Study, result: Result, contents: str = "", share: float = 1.0) -> Html:
+def page(study: Study, result: Result, contents: str = "", share: float = 1.0) -> doc.Html:
     """The study as one HTML document.
 
     contents    the name of a page beside it that lists all
     share       of its draws and grid points that was computed
     """
     quick, differs = _quick(share), study.differs(result)
-    return document(f"{study.where}: {study.title}", [
-        heading(study.title, f"{study.where} of {study.source}"),
-        paragraphs([*quick, *([differs] if differs else []), result.verdict]), _items(study, result),
+    return doc.document(f"{study.where}: {study.title}", [
+        doc.heading(study.title, f"{study.where} of {study.source}"),
+        doc.paragraphs([*quick, *([differs] if differs else []), result.verdict]), _items(study, result),
         *map(_table, result.all_tables),
-        section("Pictures", concatenated(map(_picture, result.pictures))) if result.pictures else EMPTY,
-        section("How it was made", paragraphs([
+        doc.section("Pictures", doc.concatenated(map(_picture, result.pictures))) if result.pictures else doc.EMPTY,
+        doc.section("How it was made", doc.paragraphs([
             study.how, f"ridelog study {study.called}{' DIR' * bool(study.data)}{' --quick' * bool(quick)}"])),
-        html('<p><a href="{}">All studies</a></p>', contents) if contents else EMPTY], style=_STYLE)
+        doc.html('<p><a href="{}">All studies</a></p>', contents) if contents else doc.EMPTY], style=_STYLE)
 
 
-def _items(study: Study, result: Result) -> Html:
+def _items(study: Study, result: Result) -> doc.Html:
     """Each printed item with the word that its checks come to."""
     lines = []
     for names, item in study.groups:
         checks = max(len(study.checks_of(name, result)) for name in names)
         counted = f" ({checks} check{'s' * (checks > 1)}{' of each' * (len(names) > 1)})" if checks else ""
         lines.append(f"{_joined(names)}: {word_of(study.checks_of(item.name, result))}. {item.because}{counted}")
-    return section("How ours stands beside the print", bullets(lines))
+    return doc.section("How ours stands beside the print", doc.bullets(lines))
 
 
-def _picture(picture: Picture) -> Html:
+def _picture(picture: Picture) -> doc.Html:
     drawn = chart(picture.chart)
-    return html("{}{}", drawn, hint(f"Printed: {picture.printed}.")) if picture.printed else drawn
+    return doc.html("{}{}", drawn, doc.hint(f"Printed: {picture.printed}.")) if picture.printed else drawn
 
 
 def _joined(names: Sequence[str]) -> str:
@@ -78,7 +65,7 @@ def _quick(share: float) -> list[str]:
     return [] if share == 1.0 else [f"Quick: with {share:.0%} of the draws and grid points."]
 
 
-def index(known: Sequence[Study], carried: Mapping[str, Carried], share: float = 1.0) -> Html:
+def index(known: Sequence[Study], carried: Mapping[str, Carried], share: float = 1.0) -> doc.Html:
     """The table of contents of studies whose pages lie beside it, with the word of each; ``carried`` by the studies'
     names, without those that were not run; ``share`` of their draws and grid points that was computed."""
     words = [word for one in known for names, item in one.groups
@@ -86,20 +73,20 @@ def index(known: Sequence[Study], carried: Mapping[str, Carried], share: float =
     counts = [(word, str(words.count(word)), "") for word in (*map(str, Word), _FAILED, _NOT_RUN)]
     parts = [[one for one in known if (one.source == DISSERTATION) is its_own] for its_own in (True, False)]
     titles = (f"Contents: {DISSERTATION}", "Contents: other sources")
-    return document("Studies", [
-        heading("Studies: printed results, made again",
-                "Each printed item has one word for how ours compares with it."),
-        paragraphs(_quick(share)), tiles(tile for tile in counts if tile[1] != "0"),
+    return doc.document("Studies", [
+        doc.heading("Studies: printed results, made again",
+                    "Each printed item has one word for how ours compares with it."),
+        doc.paragraphs(_quick(share)), doc.tiles(tile for tile in counts if tile[1] != "0"),
         *(_contents(title, part, carried) for title, part in zip(titles, parts, strict=True) if part)],
         style=_INDEX_STYLE)
 
 
-def _contents(title: str, part: Sequence[Study], carried: Mapping[str, Carried]) -> Html:
+def _contents(title: str, part: Sequence[Study], carried: Mapping[str, Carried]) -> doc.Html:
     rows = [row for one in part for row in _rows(one, carried.get(one.called))]
-    return section(title, grid(("printed", "study", "word", "because", "time"), rows, range(4)))
+    return doc.section(title, doc.grid(("printed", "study", "word", "because", "time"), rows, range(4)))
 
 
-def _rows(study: Study, found: Carried | None) -> list[tuple[str, Html, str, str, str]]:
+def _rows(study: Study, found: Carried | None) -> list[tuple[str, doc.Html, str, str, str]]:
     """A row for each word and reason of a study; its time stands in the first."""
     seconds = f"{found.seconds:.1f} s" if found is not None else "-"
     by_source = "" if study.source == DISSERTATION else f" ({study.source})"
@@ -119,13 +106,13 @@ def _because(study: Study, item: Item, found: Carried | None) -> str:
     return found.failure or item.because
 
 
-def _link(study: Study, found: Carried | None) -> Html:
+def _link(study: Study, found: Carried | None) -> doc.Html:
     if found is None or found.result is None:
-        return html("{}", study.title)
-    return html('<a href="{}.html">{}</a>', study.called, study.title)
+        return doc.html("{}", study.title)
+    return doc.html('<a href="{}.html">{}</a>', study.called, study.title)
 
 
-def _table(table: Table) -> Html:
+def _table(table: Table) -> doc.Html:
     rows = [[_joined(column.text(cell).split(", ")) if column.name in _UNBROKEN else column.text(cell)
              for column, cell in zip(table.columns, row, strict=True)] for row in table.rows]
-    return section(table.title, grid([column.name for column in table.columns], rows, table.words))
+    return doc.section(table.title, doc.grid([column.name for column in table.columns], rows, table.words))

@@ -130,7 +130,7 @@ def test_the_light_goes_out_after_the_note_was_removed(note: Path, tmp_path: Pat
     led.mkdir()
     (led / "trigger").write_text("none [mmc0]\n")
     note.touch()
-    export_command.show_on_led(led, note.parent)
+    export_command.sticks.show_on_led(led, note.parent)
     assert (led / "trigger").read_text() == "heartbeat"
     note.unlink()
     assert main(["export", "--removed", "--note", str(note), "--led", str(led)]) == 0

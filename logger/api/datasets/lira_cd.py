@@ -18,25 +18,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.road_sets import (
-    NOT_RUN,
-    REPEAT_COLUMNS,
-    WINDOWS_M,
-    Compared,
-    DrivenWindows,
-    RoadRecording,
-    along,
-    compared_table,
-    each_pass,
-    expected_files,
-    from_folder,
-    on_line,
-    repeat_row,
-    runs_of,
-    unit_by_gravity,
-    verdict_of,
-    windows_of,
-)
+from logger.api import road_sets
 from logger.errors import BadInput
 from logger.extraction.along_track import ASIDE_M, MeasuredLine
 from logger.files import read_bounded
@@ -78,8 +60,8 @@ class ProfiledRoad:
 
 def run(folder: Path, effort: Workload) -> Result:
     """As ``from_folder`` calls it."""
-    files = expected_files(folder, "platoon_*.hdf5", "the cars' records AutoPi_CAN/platoon_CPH1_HH.hdf5")
-    parts: list[Compared] = []
+    files = road_sets.expected_files(folder, "platoon_*.hdf5", "the cars' records AutoPi_CAN/platoon_CPH1_HH.hdf5")
+    parts: list[road_sets.Compared] = []
     refused: list[str] = []
     repeats: list[Any] = []
     for file in files:
@@ -87,18 +69,19 @@ def run(folder: Path, effort: Workload) -> Result:
         whole, left = recordings(file)
         refused += left
         passes = effort.some(whole, 1) if whole else []
-        found, left = each_pass(passes, lambda one, road=road: _windows(  # type: ignore[misc]
+        found, left = road_sets.each_pass(passes, lambda one, road=road: _windows(  # type: ignore[misc]
             one, effort.vehicle or _CAR, road), effort.progress)
         refused += left
         parts += [_beside(road, [one for moved, one in found if moved == moves and one.window_m == window_m], window_m,
-                          moves) for window_m in WINDOWS_M for moves in (False, True) if found]
-        repeats += [row for window_m in WINDOWS_M for row in _repeats(road, window_m)]
+                          moves) for window_m in road_sets.WINDOWS_M for moves in (False, True) if found]
+        repeats += [row for window_m in road_sets.WINDOWS_M for row in _repeats(road, window_m)]
     if not parts:
         raise BadInput(f"{folder}: expected a pass that can be used, found none; {refused[0]}")
-    tables = [compared_table(parts, window_m) for window_m in WINDOWS_M]
-    tables.append(Table("The profilers against each other", REPEAT_COLUMNS, tuple(repeats)))
-    pictures = tuple(Picture(along(one)) for one in parts if one.window_m == WINDOWS_M[-1] and one.what == "car")
-    return Result(tuple(tables), verdict_of(parts, refused, _CEILING), pictures)
+    tables = [road_sets.compared_table(parts, window_m) for window_m in road_sets.WINDOWS_M]
+    tables.append(Table("The profilers against each other", road_sets.REPEAT_COLUMNS, tuple(repeats)))
+    pictures = tuple(Picture(road_sets.along(one)) for one in parts if one.window_m == road_sets.WINDOWS_M[-1]
+                     and one.what == "car")
+    return Result(tuple(tables), road_sets.verdict_of(parts, refused, _CEILING), pictures)
 
 
 _CEILING = ("The profilers against each other are the ceiling: no car can agree better with one of them than the other "
@@ -108,7 +91,7 @@ _CEILING = ("The profilers against each other are the ceiling: no car can agree 
 # --- files ---
 
 
-def recordings(file: Path) -> tuple[list[RoadRecording], list[str]]:
+def recordings(file: Path) -> tuple[list[road_sets.RoadRecording], list[str]]:
     """The passes of a file, and a line for each that lacks a signal. Raises BadInput for a file that is not of this
     layout, or where HDF5 cannot be read."""
     try:
@@ -132,7 +115,7 @@ def recordings(file: Path) -> tuple[list[RoadRecording], list[str]]:
         raise BadInput(f"{file}: expected an HDF5 file, found {error}") from None
 
 
-def _recording(name: str, group: Any) -> RoadRecording:
+def _recording(name: str, group: Any) -> road_sets.RoadRecording:
     def signal(key: str, columns: int) -> Array:
         found = np.asarray(group[key][()], dtype=np.float64) if key in group else np.empty(0)
         if found.ndim != 2 or found.shape[1] < columns or len(found) < 2:
@@ -143,7 +126,8 @@ def _recording(name: str, group: Any) -> RoadRecording:
     accel, gps, speed = signal("acc.xyz", 4), signal("gps", 3), signal("spd_veh", 2)
     inside = (gps[:, 0] >= speed[0, 0]) & (gps[:, 0] <= speed[-1, 0])
     gps = gps[inside]
-    return RoadRecording(name, accel[:, 0], accel[:, 1:4], unit_by_gravity(accel[:, 1:4]), gps[:, 0],
+    return road_sets.RoadRecording(name, accel[:, 0], accel[:, 1:4], road_sets.unit_by_gravity(accel[:, 1:4]),
+                                   gps[:, 0],
                      np.interp(gps[:, 0], speed[:, 0], speed[:, 1] * KMH_MPS), gps[:, 1], gps[:, 2])
 
 
@@ -153,7 +137,8 @@ def profiled_road(folder: Path, cars: Path) -> ProfiledRoad:
     if named is None:
         raise BadInput(f"{cars}: expected a name like platoon_CPH1_HH.hdf5")
     route, side = (one.lower() for one in named.groups())
-    iri, places = (expected_files(folder, f"{route}_{what}_{side}.csv", f"the profiler's {what} of {cars.name}")[0]
+    iri, places = (road_sets.expected_files(folder, f"{route}_{what}_{side}.csv",
+                                            f"the profiler's {what} of {cars.name}")[0]
                    for what in ("iri_mpd_rut", "zp"))
     begin_m, left, right = _columns(iri, "Distance [m]", "IRI (5) [m/km]", "IRI (21) [m/km]")
     begin_m, first = np.unique(begin_m, return_index=True)
@@ -197,47 +182,52 @@ def _aran(path: Path, line: MeasuredLine) -> tuple[Array, Array]:
 # --- the car, and one profiler beside the other ---
 
 
-def _windows(recording: RoadRecording, vehicle: str, road: ProfiledRoad) -> list[tuple[bool, DrivenWindows]]:
+def _windows(recording: road_sets.RoadRecording, vehicle: str,
+             road: ProfiledRoad) -> list[tuple[bool, road_sets.DrivenWindows]]:
     """Of each time that the pass goes over the profiled road, with windows where its cells are; once more, True beside
     it, moved along to where cells of 10 m fit best."""
     model = read_model(vehicle_path(vehicle))
-    found: list[tuple[bool, DrivenWindows]] = []
-    runs = [one for run in runs_of(recording, vehicle) for one in on_line(run, road.line, float(road.edges_m[0]))]
+    found: list[tuple[bool, road_sets.DrivenWindows]] = []
+    runs = [one for run in road_sets.runs_of(recording, vehicle)
+            for one in road_sets.on_line(run, road.line, float(road.edges_m[0]))]
     edges_m = road.edges_m - road.edges_m[0]
     for run in runs:
-        if not (each := windows_of(run, model, (_FINE_M, *WINDOWS_M))):
+        if not (each := road_sets.windows_of(run, model, (_FINE_M, *road_sets.WINDOWS_M))):
             continue
         fine, *placed = each
         driven = (edges_m[:-1] >= fine.begin_m[0]) & (edges_m[1:] <= fine.end_m[-1])
         shift_m = best_shift_m(np.append(fine.begin_m, fine.end_m[-1]), fine.iri_m_per_km, edges_m[:-1][driven],
                                edges_m[1:][driven], road.iri_m_per_km[driven], _MOST_SHIFT_M)
-        moved = windows_of(replace(run, distance_m=run.distance_m - shift_m), model)
+        moved = road_sets.windows_of(replace(run, distance_m=run.distance_m - shift_m), model)
         found += [(False, one) for one in placed] + [(True, one) for one in moved]
     if not found:
         raise BadInput("expected a pass over the profiled road, found none")
     return found
 
 
-def _beside(road: ProfiledRoad, drives: list[DrivenWindows], window_m: float, moved: bool) -> Compared:
+def _beside(road: ProfiledRoad, drives: list[road_sets.DrivenWindows], window_m: float,
+            moved: bool) -> road_sets.Compared:
     begin_m, end_m, iri, std = (np.concatenate([getattr(one, name) for one in drives]) for name in (
         "begin_m", "end_m", "iri_m_per_km", "iri_std_m_per_km"))
     edges_m = road.edges_m - road.edges_m[0]
     theirs = mean_between(edges_m, road.iri_m_per_km, begin_m, end_m)
-    return Compared(road.name, window_m, begin_m, iri, std, theirs, "car, moved along to fit" if moved else "car")
+    return road_sets.Compared(road.name, window_m, begin_m, iri, std, theirs, "car, moved along to fit" if moved
+                              else "car")
 
 
 def _repeats(road: ProfiledRoad, window_m: float) -> list[tuple[Any, ...]]:
     begin_m = np.arange(road.edges_m[0], road.edges_m[-1] - window_m + 1, window_m)
     left, right = (mean_between(road.edges_m, one, begin_m, begin_m + window_m)
                    for one in (road.left_m_per_km, road.right_m_per_km))
-    rows = [repeat_row(road.name, f"P79, right track against left, {window_m:g} m", right, left)]
+    rows = [road_sets.repeat_row(road.name, f"P79, right track against left, {window_m:g} m", right, left)]
     if road.aran_m is not None and road.aran_m_per_km is not None and len(road.aran_m) > 2:
         theirs, cells = matching_cells(road.edges_m[:-1], road.iri_m_per_km, road.aran_m, road.aran_m_per_km,
                                        _MOST_CELLS)
         known = np.where(np.isfinite(theirs), road.iri_m_per_km, np.nan)
         both = (mean_between(road.edges_m, theirs, begin_m, begin_m + window_m),
                 mean_between(road.edges_m, known, begin_m, begin_m + window_m))
-        rows.append(repeat_row(road.name, f"ARAN against P79, {window_m:g} m", *both, moved_m=_CELL_M * cells))
+        rows.append(road_sets.repeat_row(road.name, f"ARAN against P79, {window_m:g} m", *both, moved_m=_CELL_M
+                                         * cells))
     return rows
 
 
@@ -248,6 +238,6 @@ STUDY = Study(
     "profiler's cells, where the receiver puts them; then moved along by up to 30 m to where they fit best. The cars "
     "are Renault Zoe, whose numbers are not published: the model of a sedan stands in, unless --vehicle names another. "
     "The reader is tested on small files of the same layout.",
-    from_folder("LiRA-CD", _DOWNLOAD, run), (Item("LiRA-CD", Word.NOT_REPRODUCIBLE, NOT_RUN),),
+    road_sets.from_folder("LiRA-CD", _DOWNLOAD, run), (Item("LiRA-CD", Word.NOT_REPRODUCIBLE, road_sets.NOT_RUN),),
     source="Skar et al., LiRA-CD, Data in Brief, 2023", data=f"LiRA-CD ({_DOWNLOAD})")
 STUDIES = (STUDY,)

@@ -15,22 +15,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.road_sets import (
-    NOT_RUN,
-    REPEAT_R2,
-    WINDOWS_M,
-    Compared,
-    DrivenWindows,
-    RoadRecording,
-    along,
-    compared_table,
-    driven_windows,
-    each_pass,
-    expected_files,
-    from_folder,
-    unit_by_gravity,
-    verdict_of,
-)
+from logger.api import road_sets
 from logger.errors import BadInput
 from logger.geodesy import EARTH_RADIUS_M
 from logger.store.formats.drive_file import write_table
@@ -71,8 +56,8 @@ class LaserRoad:
 def run(folder: Path, effort: Workload) -> Result:
     """As ``from_folder`` calls it."""
     roads = laser_roads(folder)
-    trips = [trip(one) for one in expected_files(folder, "*-2019-*.mat", "the phones' trips")]
-    found: list[tuple[str, DrivenWindows]] = []
+    trips = [trip(one) for one in road_sets.expected_files(folder, "*-2019-*.mat", "the phones' trips")]
+    found: list[tuple[str, road_sets.DrivenWindows]] = []
     refused: list[str] = []
     elsewhere: list[str] = []
     pairs = effort.some([(road, one) for road in roads for one in trips], 1)
@@ -81,30 +66,31 @@ def run(folder: Path, effort: Workload) -> Result:
             line = Path(scratch) / f"profile-{number}.csv"
             road.write(line)
             mine = [one for each, one in pairs if each is road]
-            windows, left = each_pass(mine, lambda one, line=line: driven_windows(  # type: ignore[misc]
+            windows, left = road_sets.each_pass(mine, lambda one,
+                                                line=line: road_sets.driven_windows(  # type: ignore[misc]
                 one, effort.vehicle or _CAR, profile=line), effort.progress)
             found += [(road.name, one) for one in windows]
             elsewhere += [one for one in left if _OFF in one]
             refused += [one for one in left if _OFF not in one]
-    parts = [part for road in roads for window_m in WINDOWS_M
+    parts = [part for road in roads for window_m in road_sets.WINDOWS_M
              if (part := _together(road.name, window_m, found)) is not None]
     if not parts:
         raise BadInput(f"{folder}: expected trips on the profiled roads, found none; {(refused + elsewhere)[0]}")
-    tables = tuple(compared_table(parts, window_m) for window_m in WINDOWS_M)
-    return Result(tables, verdict_of(parts, refused, _ceiling()),
-                  tuple(Picture(along(one)) for one in parts if one.window_m == WINDOWS_M[-1]))
+    tables = tuple(road_sets.compared_table(parts, window_m) for window_m in road_sets.WINDOWS_M)
+    return Result(tables, road_sets.verdict_of(parts, refused, _ceiling()),
+                  tuple(Picture(road_sets.along(one)) for one in parts if one.window_m == road_sets.WINDOWS_M[-1]))
 
 
 def _ceiling() -> str:
-    spans = [f"{low:.2f} to {high:.2f} per {window_m:g} m" for window_m, (low, high) in REPEAT_R2.items()]
+    spans = [f"{low:.2f} to {high:.2f} per {window_m:g} m" for window_m, (low, high) in road_sets.REPEAT_R2.items()]
     return ("The set holds one profile of each road, no repeat; passes of another profiler repeat each other with R2 "
             f"{' and '.join(spans)} (lira-map).")
 
 
 def laser_roads(folder: Path) -> list[LaserRoad]:
     """The three roads. Raises BadInput and FileNotFoundError."""
-    return [_laser_road(name, expected_files(folder, elevation, "the laser profiles")[0], half,
-                        expected_files(folder, places, "their places")[0])
+    return [_laser_road(name, road_sets.expected_files(folder, elevation, "the laser profiles")[0], half,
+                        road_sets.expected_files(folder, places, "their places")[0])
             for name, elevation, half, places in _ROADS]
 
 
@@ -131,7 +117,7 @@ def _laser_road(name: str, elevation: Path, half: int, places: Path) -> LaserRoa
     return LaserRoad(name, spacing_m, elevation_m, *(np.interp(at_m, along_m, one) for one in (lat_deg, lon_deg)))
 
 
-def trip(file: Path) -> RoadRecording:
+def trip(file: Path) -> road_sets.RoadRecording:
     """A phone's record. Raises BadInput."""
     columns = read_arrays(file, _TRIP)
     if len(set(map(len, columns))) > 1:
@@ -142,17 +128,19 @@ def trip(file: Path) -> RoadRecording:
     fixed = (np.abs(lat_deg) > 1e-6) & np.isfinite(lat_deg + lon_deg + speed_mps)
     second = np.floor((time_s - time_s[0]) / _FIX_S)
     kept = np.flatnonzero(fixed)[np.unique(second[fixed], return_index=True)[1]]
-    return RoadRecording(file.stem, time_s, accel, unit_by_gravity(accel), time_s[kept], speed_mps[kept], lat_deg[kept],
+    return road_sets.RoadRecording(file.stem, time_s, accel, road_sets.unit_by_gravity(accel), time_s[kept],
+                                   speed_mps[kept], lat_deg[kept],
                      lon_deg[kept])
 
 
-def _together(road: str, window_m: float, found: list[tuple[str, DrivenWindows]]) -> Compared | None:
+def _together(road: str,
+              window_m: float, found: list[tuple[str, road_sets.DrivenWindows]]) -> road_sets.Compared | None:
     chosen = [one for name, one in found if name == road and one.window_m == window_m]
     if not chosen:
         return None
     begin_m, iri, std, exact = (np.concatenate([getattr(one, name) for one in chosen]) for name in (
         "begin_m", "iri_m_per_km", "iri_std_m_per_km", "exact_m_per_km"))
-    return Compared(road, window_m, begin_m, iri, std, exact)
+    return road_sets.Compared(road, window_m, begin_m, iri, std, exact)
 
 
 _DOWNLOAD = "download doi 10.5281/zenodo.4386256 (CC0) and unpack it into one folder"
@@ -162,6 +150,7 @@ STUDY = Study(
     "places and then by the road as it was felt, estimate compares its windows with the profile's exact IRI. The cars' "
     "numbers are not published: the model of a sedan stands in, unless --vehicle names another. The reader is tested "
     "on small files of the same layout.",
-    from_folder("Zenodo 4386256", _DOWNLOAD, run), (Item("Zenodo 4386256", Word.NOT_REPRODUCIBLE, NOT_RUN),),
+    road_sets.from_folder("Zenodo 4386256", _DOWNLOAD, run),
+    (Item("Zenodo 4386256", Word.NOT_REPRODUCIBLE, road_sets.NOT_RUN),),
     source="Botshekan et al., Zenodo 4386256, 2021", data=f"Zenodo 4386256 ({_DOWNLOAD})")
 STUDIES = (STUDY,)

@@ -6,24 +6,7 @@ from math import isfinite
 from pathlib import Path
 from typing import Annotated
 
-from logger.api.question import (
-    NOISE_MODELS,
-    TRIES,
-    WAVINESS,
-    Anyway,
-    Argument,
-    InPython,
-    LongQuestion,
-    LowPass,
-    Option,
-    Out,
-    Runs,
-    Switches,
-    VehicleName,
-    Verb,
-    named_numbers,
-    names_of,
-)
+from logger.api import question
 
 OBSTACLES = {"bump": ("height_m", "width_m"), "step": ("height_m",)}
 """What lies on a road, and its numbers beside ``start_m``."""
@@ -52,11 +35,11 @@ def _numbers(text: str, count: int) -> tuple[str, list[float]]:
 
 
 def _obstacle(text: str) -> tuple[str, dict[str, float]]:
-    return named_numbers(text, "--obstacle")
+    return question.named_numbers(text, "--obstacle")
 
 
 @dataclass(frozen=True)
-class IdentifyQuestion(LongQuestion):
+class IdentifyQuestion(question.LongQuestion):
     """Vehicle parameters from drives over known roads: a grey-box prediction-error fit.
 
     Each RUN is a drive.csv, or a folder with drive.csv (t_s,accel_z_mps2,speed_mps,distance_m) and the profile.csv it
@@ -102,39 +85,42 @@ class IdentifyQuestion(LongQuestion):
     (True, True)
     """
 
-    vehicle: VehicleName
-    runs: Annotated[Runs, Argument("folder with drive.csv and profile.csv, or of a rig excitation.csv, or a drive.csv; "
-                                   "of one sample rate", metavar="RUN", read=Path, many=list)]
-    free: Annotated[Sequence[str] | None, Option(
+    vehicle: question.VehicleName
+    runs: Annotated[question.Runs, question.Argument(
+        "folder with drive.csv and profile.csv, or of a rig excitation.csv, or a drive.csv; of one sample rate",
+        metavar="RUN", read=Path, many=list)]
+    free: Annotated[Sequence[str] | None, question.Option(
         "what to find: names as in the vehicle's file, dry_friction.friction_force_n of an effect, bump.height_m, "
         "step.start_m, speed_scale or road.waviness of the road (default: what the vehicle's file calls unknown or not "
-        "known exactly, weighed with what it says, and its effects)", metavar="PARAM,...", read=names_of)] = None
+        "known exactly, weighed with what it says, and its effects)", metavar="PARAM,...",
+        read=question.names_of)] = None
     _: KW_ONLY
-    start: Annotated[Mapping[str, float] | None, Option(
+    start: Annotated[Mapping[str, float] | None, question.Option(
         "where to start instead of the vehicle's value; may repeat", metavar="PARAM=VALUE", read=_number,
         many=dict)] = None
-    bounds: Annotated[Mapping[str, tuple[float, float]] | None, Option(
+    bounds: Annotated[Mapping[str, tuple[float, float]] | None, question.Option(
         "where to stay, sizes above 0 (default: within a factor of 20, lengths 3); may repeat",
         metavar="PARAM=LOW,HIGH", read=_interval, many=dict)] = None
-    obstacles: Annotated[Mapping[str, Mapping[str, float]] | None, Option(
+    obstacles: Annotated[Mapping[str, Mapping[str, float]] | None, question.Option(
         "what lies on the road [m]; may repeat. bump: height_m, width_m; step, up or with a negative height down: "
         "height_m. Without start_m it is looked for; its numbers are free as bump.height_m ... In Python: "
         '{"bump": {"height_m": 0.1, "width_m": 3.0}}', metavar="NAME:PARAM=VALUE,...", read=_obstacle, many=dict,
         flag="--obstacle")] = None
-    noise: Annotated[str, Option(
+    noise: Annotated[str, question.Option(
         "model of the residual: white (output error), ar (innovations form), road (roughness that the profile does "
-        "not contain, through the car); auto: the likeliest", choices=NOISE_MODELS)] = "auto"
-    low_pass_hz: LowPass = None
-    tries: Annotated[int, InPython("so many further starts, spread around", TRIES)] = 0
-    road: Annotated[str, Switches(
+        "not contain, through the car); auto: the likeliest", choices=question.NOISE_MODELS)] = "auto"
+    low_pass_hz: question.LowPass = None
+    tries: Annotated[int, question.InPython("so many further starts, spread around", question.TRIES)] = 0
+    road: Annotated[str, question.Switches(
         "measured: with its profile; unmeasured: each run has a road of its own, of the waviness; same: all are over "
         "one", choices=(MEASURED, UNMEASURED, SAME), by_value={
             UNMEASURED: ("unmeasured-road", "the roads were not measured; each run has one of its own"),
             SAME: ("same-road", "the road was not measured; all runs are over the same one; their places may be off "
                                 "by 10 m, their distances by 1 per cent")})] = MEASURED
-    waviness: Annotated[float | None, InPython(
-        "of a road that was not measured (default: 2); to find it, add road.waviness to `free`", WAVINESS)] = None
-    anyway: Anyway = False
+    waviness: Annotated[float | None, question.InPython(
+        "of a road that was not measured (default: 2); to find it, add road.waviness to `free`",
+        question.WAVINESS)] = None
+    anyway: question.Anyway = False
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -142,6 +128,6 @@ class IdentifyQuestion(LongQuestion):
             raise self.wrong("waviness", ": expected a road that was not measured (`unmeasured_road` or `same_road`)")
 
 
-VERB = Verb(IdentifyQuestion, "logger.api.identify.answer:answer", (Out(
+VERB = question.Verb(IdentifyQuestion, "logger.api.identify.answer:answer", (question.Out(
     "write the vehicle with the fitted values; FILE.html, .png, .svg, .pdf: pictures of the residual and of correlated "
     "numbers; may repeat", metavar="FILE", others=("*",)),), "logger.api.identify.answer:refusal_json")

@@ -40,21 +40,8 @@ from logger.lab.selection.add_effect import BIAS_SIGMA, AddedEffects, Number
 from logger.lab.selection.add_effect import Number as ShiftedNumber
 from logger.lab.selection.holdout import JUDGED_ON, fit_percent
 from logger.left_out import left_out_json, left_out_paragraph
+from logger.report import document as doc
 from logger.report.charts import chart
-from logger.report.document import (
-    EMPTY,
-    Html,
-    bullets,
-    concatenated,
-    document,
-    grid,
-    heading,
-    hint,
-    html,
-    paragraphs,
-    section,
-    tiles,
-)
 from logger.report.quantities import chance, columns, finite, numbers_of, signal_errors, unit_of, wrapped
 from logger.runs import Run, are_on_rig, normalised_rms_error, runs_left_out, short_names
 from logger.store.formats import vehicle_file
@@ -98,7 +85,7 @@ class Comparison(CommandResult):
         """Spectra of measurement, model and residual after the refit."""
         return spectra(self.found.refitted.residuals)
 
-    def as_page(self, of: str) -> Html:
+    def as_page(self, of: str) -> doc.Html:
         """The comparison as one HTML document."""
         return page(self.found)
 
@@ -146,7 +133,7 @@ class AddedEffect(CommandResult):
     numbers: tuple[ShiftedNumber, ...]
     model: Model
 
-    def figures(self) -> list[Html]:
+    def figures(self) -> list[doc.Html]:
         """How the error fell."""
         return [falling("NRMSE, model by model", [
             ("as filed", self.error_before), ("parameters refitted", self.error_refitted),
@@ -379,14 +366,14 @@ _MOST_RUNS = 8
 _WORST = 8
 
 
-def page(found: LabComparison) -> Html:
+def page(found: LabComparison) -> doc.Html:
     """The comparison as one HTML document."""
     residuals = found.refitted.residuals
     title = f"{found.vehicle}: model and measurement"
-    return document(title, [
-        heading(title, ", ".join(run.name for run in residuals.runs)), _tiles(found),
-        paragraphs([conclusion(found), *headline(found)]),
-        section("After the refit", bullets(evidence(found)) + paragraphs([next_step(found)])),
+    return doc.document(title, [
+        doc.heading(title, ", ".join(run.name for run in residuals.runs)), _tiles(found),
+        doc.paragraphs([conclusion(found), *headline(found)]),
+        doc.section("After the refit", doc.bullets(evidence(found)) + doc.paragraphs([next_step(found)])),
         removed_section(found.removed, found.band),
         whole_drives(residuals), _worst_place(found.refitted), spectra_section(residuals),
         _comparison_page_tables(found),
@@ -395,13 +382,15 @@ def page(found: LabComparison) -> Html:
     ])
 
 
-def _tiles(found: LabComparison) -> Html:
+def _tiles(found: LabComparison) -> doc.Html:
     residuals = found.plain.residuals
-    return tiles([("NRMSE as filed", f"{found.plain.error:.3f}", ""),
-                  ("NRMSE refitted", f"{found.steps[-1].error:.3f}", JUDGED_ON),
-                  *drift_tile(found.removed),
-                  ("Residual tests that find something", f"{len(found.tests_found)}", f"of {len(found.tests.tests)}"),
-                  ("Runs", f"{len(residuals.runs)}", f"{sum(map(len, residuals.residual)) / residuals.rate_hz:.0f} s")])
+    return doc.tiles([("NRMSE as filed", f"{found.plain.error:.3f}", ""),
+                      ("NRMSE refitted", f"{found.steps[-1].error:.3f}", JUDGED_ON),
+                      *drift_tile(found.removed),
+                      ("Residual tests that find something", f"{len(found.tests_found)}",
+                       f"of {len(found.tests.tests)}"),
+                      ("Runs",
+                       f"{len(residuals.runs)}", f"{sum(map(len, residuals.residual)) / residuals.rate_hz:.0f} s")])
 
 
 # --- pictures ---
@@ -412,7 +401,7 @@ def _axis(run: Run) -> str:
     return f"{run.facts.main.measures} [{run.facts.main.unit}]"
 
 
-def whole_drives(residuals: ModelResiduals) -> Html:
+def whole_drives(residuals: ModelResiduals) -> doc.Html:
     """What was measured and what the model leaves of it, over the whole of each run."""
     names, drawn = short_names(residuals.runs), []
     for index, run in enumerate(residuals.runs[:_MOST_RUNS]):
@@ -420,22 +409,22 @@ def whole_drives(residuals: ModelResiduals) -> Html:
         lines = tuple(line(word, time_s, values[index]) for word, values in (
             ("measured", residuals.measured), ("residual", residuals.residual)))
         drawn.append(chart(Curves(names[run.name], "time [s]", _axis(run), lines)))
-    return section("Each run", concatenated(drawn))
+    return doc.section("Each run", doc.concatenated(drawn))
 
 
-def _worst_place(standing: Standing) -> Html:
+def _worst_place(standing: Standing) -> doc.Html:
     residuals, worst = standing.residuals, worst_moment(standing)
     index, part = worst.run, worst.part
     time_s = (residuals.runs[index].first + np.arange(len(residuals.residual[index])))[part] / residuals.rate_hz
     lines = tuple(Line(name, time_s, values[index][part]) for name, values in (
         ("measured", residuals.measured), ("residual", residuals.residual), ("model", residuals.model)))
     drawn = Curves(worst.words, "time [s]", _axis(residuals.runs[index]), lines)
-    return section("The worst place", chart(drawn))
+    return doc.section("The worst place", chart(drawn))
 
 
-def spectra_section(residuals: ModelResiduals) -> Html:
+def spectra_section(residuals: ModelResiduals) -> doc.Html:
     """Spectra of measurement, model and residual."""
-    return section("By frequency", concatenated(map(chart, spectra(residuals))))
+    return doc.section("By frequency", doc.concatenated(map(chart, spectra(residuals))))
 
 
 def spectra(residuals: ModelResiduals) -> tuple[Curves, Curves]:
@@ -453,9 +442,9 @@ def spectra(residuals: ModelResiduals) -> tuple[Curves, Curves]:
     return drawn("The body", 0.0, _BODY_HZ), drawn("Wheels and above", _BODY_HZ, f_hz[-1])
 
 
-def _places(standing: Standing) -> Html:
+def _places(standing: Standing) -> doc.Html:
     if not standing.where.place:
-        return EMPTY
+        return doc.EMPTY
     lines, names, unit = [], short_names(standing.residuals.runs), standing.residuals.unit
     for run in standing.residuals.runs[:_MOST_RUNS]:
         parts = [part for part in standing.where.place if part.name == run.name]
@@ -465,79 +454,79 @@ def _places(standing: Standing) -> Html:
     along = Curves("Residual along the road", "distance [m]", f"residual, r.m.s. [{unit}]", tuple(lines))
     rows = [(names[part.name], f"{part.low:g} to {part.high:g}", f"{part.share:.1%}", f"{part.residual_mps2:.3g}",
              error_text(part, 2)) for part in standing.where.worst_places(_WORST)]
-    return section("By place", (chart(along) if lines else EMPTY) + grid(
+    return doc.section("By place", (chart(along) if lines else doc.EMPTY) + doc.grid(
         ("Run", "From, to [m]", "Share of the residual", f"Residual [{unit}]", "NRMSE"), rows))
 
 
-def forces_section(forces: ForceMap) -> Html:
+def forces_section(forces: ForceMap) -> doc.Html:
     """The force that is missing in the suspensions, by speed and by travel."""
-    drawn = concatenated(
+    drawn = doc.concatenated(
         chart(Curves(title, x_name, "force [N]", (Line("missing force", curve.at * factor, curve.force_n,
                                                          errors=curve.error_n),), (0.0, "nothing missing")))
         for title, x_name, curve, factor in (
             (_titled("By rate of the suspensions", forces.by_rate), "extension rate [m/s]", forces.by_rate, 1.0),
             (_titled("By travel of the suspensions", forces.by_travel), "extension [mm]", forces.by_travel, 1000.0)))
-    return section("The missing force", drawn + hint(
+    return doc.section("The missing force", drawn + doc.hint(
         "The force in each suspension, in addition to a linear spring or damper, that would explain the residual, with "
         "its standard error. A positive force pulls body and wheel together; compression is left, extension right. "
         "Distrust a curve that explains little of the residual."))
 
 
-def _alignment(found: LabComparison) -> Html:
+def _alignment(found: LabComparison) -> doc.Html:
     windows, runs = found.tests.alignment, found.plain.residuals.runs
     names = short_names(runs)
     lines = [Line(names[run.name], windows.along_m[of], windows.lag_s[of] * 1000, dots=True)
              for index, run in enumerate(runs[:_MOST_RUNS]) if (of := windows.run == index).any()]
     if not lines or are_on_rig(runs):
-        return EMPTY
+        return doc.EMPTY
     drawn = chart(Curves("Lead of the model over the measurement", "distance into the run [m]", "lead [ms]",
                            tuple(lines), (0.0, "together")))
-    return section("Alignment", drawn + hint(
+    return doc.section("Alignment", drawn + doc.hint(
         "Constant: a clock or a position is off. Growing with distance: the speed is wrong. Before the refit."))
 
 
 # --- tables ---
 
 
-def _comparison_page_tables(found: LabComparison) -> Html:
+def _comparison_page_tables(found: LabComparison) -> doc.Html:
     plain, refitted = found.plain.where, found.refitted.where
     unit = found.plain.residuals.unit
     return (_table("By band", "Hz", plain.frequency, refitted.frequency)
-            + (_table("By speed", "m/s", plain.speed, refitted.speed) if refitted.speed else EMPTY)
+            + (_table("By speed", "m/s", plain.speed, refitted.speed) if refitted.speed else doc.EMPTY)
             + _table("By amplitude", unit, plain.amplitude, refitted.amplitude))
 
 
-def _table(title: str, unit: str, plain: Sequence[Part], refitted: Sequence[Part]) -> Html:
+def _table(title: str, unit: str, plain: Sequence[Part], refitted: Sequence[Part]) -> doc.Html:
     """Shares and errors of both standings; the bounds of the parts are those of the refitted one."""
     pairs = paired(plain, refitted)
     named, stands = bool(refitted[0].name), any(one is not None for one, _ in pairs)
 
-    def cells(one: Part | None, part: Part) -> Html:
-        bar = html('<td class="bar"><span class="f0" style="width:{:.1%}"></span></td>', part.share)
-        before = html("<td class=n>{}</td>", error_text(one, 3) if one else "") if stands else EMPTY
-        return ((html("<td>{}</td>", part.name) if named else EMPTY)
-                + html("<td class=n>{:.3g} to {:.3g}</td>", part.low, part.high) + bar
-                + html("<td class=n>{:.1%}</td><td class=n>{}</td>", part.share, error_text(part, 3)) + before)
+    def cells(one: Part | None, part: Part) -> doc.Html:
+        bar = doc.html('<td class="bar"><span class="f0" style="width:{:.1%}"></span></td>', part.share)
+        before = doc.html("<td class=n>{}</td>", error_text(one, 3) if one else "") if stands else doc.EMPTY
+        return ((doc.html("<td>{}</td>", part.name) if named else doc.EMPTY)
+                + doc.html("<td class=n>{:.3g} to {:.3g}</td>", part.low, part.high) + bar
+                + doc.html("<td class=n>{:.1%}</td><td class=n>{}</td>", part.share, error_text(part, 3)) + before)
 
-    heads = ((Html("<th>Band</th>") if named else EMPTY) + html("<th class=n>From, to [{}]</th>", unit)
-             + Html("<th>Share of the residual</th><th></th><th class=n>NRMSE refitted</th>")
-             + (Html("<th class=n>NRMSE as filed</th>") if stands else EMPTY))
-    rows = concatenated(html("<tr>{}</tr>", cells(one, part)) for one, part in pairs)
-    return section(title, html('<div class="scroll"><table><tr>{}</tr>{}</table></div>', heads, rows))
+    heads = ((doc.Html("<th>Band</th>") if named else doc.EMPTY) + doc.html("<th class=n>From, to [{}]</th>", unit)
+             + doc.Html("<th>Share of the residual</th><th></th><th class=n>NRMSE refitted</th>")
+             + (doc.Html("<th class=n>NRMSE as filed</th>") if stands else doc.EMPTY))
+    rows = doc.concatenated(doc.html("<tr>{}</tr>", cells(one, part)) for one, part in pairs)
+    return doc.section(title, doc.html('<div class="scroll"><table><tr>{}</tr>{}</table></div>', heads, rows))
 
 
-def _tests(found: LabComparison) -> Html:
+def _tests(found: LabComparison) -> doc.Html:
     rows = [(test.name, _measured(test.value, test.unit), _measured(test.standard_error), _chance(test.p_value),
              "found" if test in found.tests_found else "") for test in found.tests.tests]
-    return section("All tests of the residual", grid(("Test", "Value", "Standard error", "p-value", ""), rows,
+    return doc.section("All tests of the residual", doc.grid(("Test", "Value", "Standard error", "p-value", ""), rows,
                                                                 words=(0, 4))
-                   + hint("Found: improbable in noise, and large enough to matter."))
+                       + doc.hint("Found: improbable in noise, and large enough to matter."))
 
 
-def _numbers(found: LabComparison) -> Html:
+def _numbers(found: LabComparison) -> doc.Html:
     rows = [(name, f"{move:+.1%}", "beyond its tolerance" if name in found.far else "")
             for name, move in found.moves.items()]
-    return section("What the refit moved", grid(("Parameter", "By", ""), rows, words=(0, 2)))
+    return doc.section("What the refit moved", doc.grid(("Parameter", "By", ""), rows, words=(0, 2)))
 
 
 def _titled(title: str, curve: Curve) -> str:

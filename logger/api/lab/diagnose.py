@@ -50,20 +50,8 @@ from logger.lab.unknown_road.one_road import placed_by_road
 from logger.left_out import left_out_json, left_out_paragraph
 from logger.printable import percent
 from logger.profiles.track import Track
+from logger.report import document as doc
 from logger.report.charts import chart
-from logger.report.document import (
-    EMPTY,
-    Html,
-    bullets,
-    concatenated,
-    document,
-    grid,
-    heading,
-    hint,
-    paragraphs,
-    section,
-    tiles,
-)
 from logger.report.quantities import (
     chance,
     columns,
@@ -128,11 +116,11 @@ class Diagnosis(CommandResult):
     vehicle: str
     next_command: str
 
-    def figures(self) -> list[Html]:
+    def figures(self) -> list[doc.Html]:
         """How the error fell."""
         return [falling("NRMSE, model by model", self.steps, self.noise_floor_error)]
 
-    def as_page(self, of: str) -> Html:
+    def as_page(self, of: str) -> doc.Html:
         """The diagnosis as one HTML document."""
         return page(self.found, self.vehicle)
 
@@ -596,17 +584,17 @@ _LEAST_SHARE, _MOST_BARS = 0.01, 12
 _MOTION_UNITS = {RATE: "m/s", TRAVEL: "m"}
 
 
-def page(found: LabDiagnosis, vehicle: str) -> Html:
+def page(found: LabDiagnosis, vehicle: str) -> doc.Html:
     """The diagnosis as one HTML document."""
     title = f"{vehicle}: which effect is missing?"
-    return document(title, [
-        heading(title, ", ".join(found.runs)),
-        _tiles(found), paragraphs(diagnosis_summary(found)), removed_section(found.removed, found.band),
+    return doc.document(title, [
+        doc.heading(title, ", ".join(found.runs)),
+        _tiles(found), doc.paragraphs(diagnosis_summary(found)), removed_section(found.removed, found.band),
         shape_sections(found),
-        section("NRMSE, model by model", _diagnosis_steps(found)), car_sections(found),
-        section("All candidates", _candidates(found)),
-        section("What these runs cannot tell", bullets(untested(found))),
-        section("Sources", bullets(sources(found))),
+        doc.section("NRMSE, model by model", _diagnosis_steps(found)), car_sections(found),
+        doc.section("All candidates", _candidates(found)),
+        doc.section("What these runs cannot tell", doc.bullets(untested(found))),
+        doc.section("Sources", doc.bullets(sources(found))),
     ])
 
 
@@ -615,30 +603,30 @@ def sources(found: LabDiagnosis) -> list[str]:
     return [f"{one.effect.name}: {one.effect.source}" for one in found.missing]
 
 
-def shape_sections(found: LabDiagnosis) -> Html:
+def shape_sections(found: LabDiagnosis) -> doc.Html:
     """What no candidate explains: sentences and pictures; nothing where nothing is unexplained."""
     if found.shape is None:
-        return EMPTY
-    return (section("What no effect explains", bullets(looks_like(found)))
-            + section("By frequency and distance", _where(found.shape)) + spectra_section(found.shape.residuals)
+        return doc.EMPTY
+    return (doc.section("What no effect explains", doc.bullets(looks_like(found)))
+            + doc.section("By frequency and distance", _where(found.shape)) + spectra_section(found.shape.residuals)
             + _forces(found.shape))
 
 
-def _forces(shape: Shape) -> Html:
+def _forces(shape: Shape) -> doc.Html:
     """The missing force; a sentence where no force in the suspensions would do."""
     forces = shape.tests.forces
     if max(forces.by_rate.share, forces.by_travel.share) < _LEAST_SHARE:
-        return section("The missing force", paragraphs([
+        return doc.section("The missing force", doc.paragraphs([
             "No force in the suspensions that depends on their rate or travel would explain it: it comes from "
             "elsewhere."]))
     return forces_section(forces)
 
 
-def _tiles(found: LabDiagnosis) -> Html:
+def _tiles(found: LabDiagnosis) -> doc.Html:
     missing = len(found.verdict)
     count = "nothing" if not missing else f"{missing} effect{'s' * (missing != 1)}"
     unknown = "something unknown" if not missing else f"{count}, and more"
-    return tiles([
+    return doc.tiles([
         ("Missing", unknown if found.unexplained else count, ""),
         ("NRMSE as filed", f"{found.baseline_error:.3f}", "as recorded"),
         ("NRMSE with the missing effects" if missing else "NRMSE refitted", f"{found.final_error:.3f}", "refitted"),
@@ -647,51 +635,51 @@ def _tiles(found: LabDiagnosis) -> Html:
     ])
 
 
-def _diagnosis_steps(found: LabDiagnosis) -> Html:
+def _diagnosis_steps(found: LabDiagnosis) -> doc.Html:
     drawn = falling(f"NRMSE on {JUDGED_ON}", [(step.words, step.error) for step in found.steps],
                     found.noise_floor_error)
     rows = [(f"{number}", step.words, f"{step.error:.4f}") for number, step in enumerate(found.steps)]
-    return drawn + grid(("Step", "Model", "NRMSE"), rows, words=(0, 1))
+    return drawn + doc.grid(("Step", "Model", "NRMSE"), rows, words=(0, 1))
 
 
-def _candidates(found: LabDiagnosis) -> Html:
+def _candidates(found: LabDiagnosis) -> doc.Html:
     bars = Bars("NRMSE with each effect", "NRMSE", tuple(
         (one.effect.name, one.error) for one in found.candidates[:_MOST_BARS]),
         (found.baseline_error, "as filed"))
-    return (chart(bars) + grid(_HEADS, table(found), words=(0, 3))
-            + hint("One effect at a time on the refitted model: first those that are missing, then by p-value, the "
-                   f"probability that noise alone looks like any of them. NRMSE on {JUDGED_ON}."))
+    return (chart(bars) + doc.grid(_HEADS, table(found), words=(0, 3))
+            + doc.hint("One effect at a time on the refitted model: first those that are missing, then by p-value, the "
+                       f"probability that noise alone looks like any of them. NRMSE on {JUDGED_ON}."))
 
 
-def car_sections(found: LabDiagnosis) -> Html:
+def car_sections(found: LabDiagnosis) -> doc.Html:
     """How far the car's numbers moved, as bars, and the forces of its springs and dampers as fitted, as curves."""
     if found.car is None:
-        return EMPTY
+        return doc.EMPTY
     bars = Bars("Shift of each parameter by the refit", "% of the file's value", tuple(
         (name, 100 * share) for name, (share, _) in found.car.moved.items()))
     rows = [(name, f"{share:+.1%}", f"± {tolerance:.1%}", "beyond it" if name in found.beyond else "")
             for name, (share, tolerance) in found.car.moved.items()]
-    numbers = chart(bars) + grid(("Parameter", "Shift", "Tolerance", ""), rows, words=(0, 3)) + hint(
+    numbers = chart(bars) + doc.grid(("Parameter", "Shift", "Tolerance", ""), rows, words=(0, 3)) + doc.hint(
         "A parameter that moves far may stand in for an effect that ridelog does not know.")
-    curves = concatenated(map(_force, found.car.curves))
-    said = hint("Over the range that the model's suspensions reach in 99.9 % of these runs, without forces that have a "
-                "memory.") if curves else EMPTY
-    return (section("The car's parameters", numbers if rows else EMPTY)
-            + section("Its springs and dampers", curves + said))
+    curves = doc.concatenated(map(_force, found.car.curves))
+    said = doc.hint("Over the range that the model's suspensions reach in 99.9 % of these runs, without forces that "
+                    "have a memory.") if curves else doc.EMPTY
+    return (doc.section("The car's parameters", numbers if rows else doc.EMPTY)
+            + doc.section("Its springs and dampers", curves + said))
 
 
-def _force(one: ForceCurve) -> Html:
+def _force(one: ForceCurve) -> doc.Html:
     return chart(Curves(
         f"{one.axle.capitalize()} suspension: force by {one.motion}",
         f"{one.motion} [{_MOTION_UNITS[one.motion]}], positive in extension", "force [N]",
         (Line("refitted", one.at, one.after_n), Line("as filed", one.at, one.before_n))))
 
 
-def _where(shape: Shape) -> Html:
+def _where(shape: Shape) -> doc.Html:
     """By frequency, and along the way."""
     rows = [(part.name, f"{part.low:.3g} to {part.high:.3g}", f"{part.share:.1%}", error_text(part, 2))
             for part in shape.where.frequency]
-    drawn = grid(("Band", "From, to [Hz]", "Share of the residual", "NRMSE"), rows)
+    drawn = doc.grid(("Band", "From, to [Hz]", "Share of the residual", "NRMSE"), rows)
     if shape.line is not None and shape.line.found:
         drawn += chart(Curves(f"What repeats along the road, in {shape.line.run}", "spatial frequency [1/m]",
                                 "power over its mean [1]", (Line("residual", shape.line.per_m, shape.line.power),)))

@@ -13,24 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from logger.api.lab import compare as comparing
 from logger.api.lab.bench import Bench, among, bench_with
-from logger.api.lab.compare import (
-    MOVED_HEADS,
-    MOVED_HINT,
-    AddedEffect,
-    Comparison,
-    addition_lines,
-    addition_of,
-    bias,
-    comparison_of,
-    conclusion,
-    errors,
-    evidence,
-    headline,
-    judgement,
-    moved_rows,
-    worst_moment,
-)
 from logger.api.lab.diagnose import (
     Diagnosis,
     diagnosis_lines,
@@ -54,20 +38,8 @@ from logger.lab.residuals.breakdown import ModelResiduals, frequencies, segments
 from logger.lab.selection.add_effect import AddedEffects
 from logger.lab.selection.holdout import JUDGED_ON
 from logger.lab.session import LawSearch, Round, Story
+from logger.report import document as doc
 from logger.report.charts import chart
-from logger.report.document import (
-    EMPTY,
-    Html,
-    bullets,
-    concatenated,
-    document,
-    grid,
-    heading,
-    hint,
-    paragraphs,
-    section,
-    tiles,
-)
 from logger.report.maps import MapLine, ways_map
 from logger.report.quantities import columns, wrapped
 from logger.store.formats import vehicle_file as vehicle_format
@@ -107,10 +79,10 @@ class LabStory(CommandResult):
 
     story: Story
     model: Model
-    first: Comparison
+    first: comparing.Comparison
     diagnoses: tuple[Diagnosis, ...]
-    additions: tuple[AddedEffect, ...]
-    comparisons: tuple[Comparison, ...]
+    additions: tuple[comparing.AddedEffect, ...]
+    comparisons: tuple[comparing.Comparison, ...]
     refused: tuple[str, ...]
     law: Path | None
     error_before: float
@@ -119,7 +91,7 @@ class LabStory(CommandResult):
     steps: tuple[tuple[str, float], ...]
     page: Path
 
-    def figures(self) -> list[Html]:
+    def figures(self) -> list[doc.Html]:
         """How the error fell."""
         return [falling("NRMSE, model by model", self.steps, self.noise_floor_error)]
 
@@ -190,9 +162,10 @@ def walk(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progress, exp
     summary = as_json(story) | {"story": str(out / STORY)}
     return LabStory(
         "\n".join([*columns([("Model", "Error"), *rows]), "", wrapped(ending(story))]), summary, story,
-        model_of(model), comparison_of(story.first), tuple(diagnosis_of(one, given) for one in story.diagnoses),
-        tuple(addition_of(one.addition, read_vehicle(one.file)) for one in story.rounds),
-        tuple(comparison_of(one.comparison) for one in story.rounds), story.refused,
+        model_of(model), comparing.comparison_of(story.first),
+        tuple(diagnosis_of(one, given) for one in story.diagnoses),
+        tuple(comparing.addition_of(one.addition, read_vehicle(one.file)) for one in story.rounds),
+        tuple(comparing.comparison_of(one.comparison) for one in story.rounds), story.refused,
         Path(story.law.file) if story.law and story.law.file else None, summary["error_before"], summary["error_after"],
         story.floor, tuple(steps(story)), out / STORY)
 
@@ -281,7 +254,7 @@ class _Step:
         """The vehicle with what was added written and compared."""
         model = self.given.model_with(addition)
         vehicle_format.write_model(file, model)
-        self.notify([*addition_lines(addition), "", f"Vehicle: {file}"])
+        self.notify([*comparing.addition_lines(addition), "", f"Vehicle: {file}"])
         self.notify(chapter("Compare again", self.explain("again", name, str(file))))
         given = replace(self.given, model=model)
         made = Round(addition, _compared(given, self.progress), str(file))
@@ -315,7 +288,8 @@ def chapter(title: str, explained: str = "") -> list[str]:
 
 
 def _comparison_lines(found: compare.LabComparison) -> list[str]:
-    return [wrapped([conclusion(found), *headline(found)]), "", "After the refit:", wrapped(evidence(found), "- ")]
+    return [wrapped([comparing.conclusion(found), *comparing.headline(found)]), "", "After the refit:",
+            wrapped(comparing.evidence(found), "- ")]
 
 
 def steps(story: Story) -> list[tuple[str, float]]:
@@ -329,7 +303,7 @@ def steps(story: Story) -> list[tuple[str, float]]:
 def ending(story: Story) -> list[str]:
     """What it came to."""
     diagnosis, models = story.diagnoses[-1], steps(story)
-    with_what = [bias(story.added, story.moved)] if story.added else []
+    with_what = [comparing.bias(story.added, story.moved)] if story.added else []
     lines = []
     if story.added:
         lines.append(f"{' and '.join(story.added)} reduced the NRMSE from {models[1][1]:.3f} to {models[-1][1]:.3f}, "
@@ -376,33 +350,35 @@ _HIGHEST_OF_RATE = 0.4
 _QUIET_DB = -80.0
 
 
-def story_page(story: Story) -> Html:
+def story_page(story: Story) -> doc.Html:
     """The story as one HTML document."""
     title = f"{story.first.vehicle}: what the model lacked"
     runs = story.first.plain.residuals.runs
     last = story.diagnoses[-1]
     at_last = [last] if len(story.diagnoses) > 1 and not last.missing else []
     before = story.diagnoses[:len(story.diagnoses) - len(at_last)]
-    return document(title, [
-        heading(title, ", ".join(run.name for run in runs)),
-        _story_tiles(story), paragraphs(ending(story)), section("NRMSE, model by model", _steps(story)),
-        section("Initially", paragraphs([conclusion(story.first), *headline(story.first)])
-                + bullets(evidence(story.first))),
-        section("What was missing", concatenated(paragraphs(diagnosis_summary(one)) for one in before)),
+    return doc.document(title, [
+        doc.heading(title, ", ".join(run.name for run in runs)),
+        _story_tiles(story), doc.paragraphs(ending(story)), doc.section("NRMSE, model by model", _steps(story)),
+        doc.section("Initially", doc.paragraphs([comparing.conclusion(story.first), *comparing.headline(story.first)])
+                    + doc.bullets(comparing.evidence(story.first))),
+        doc.section("What was missing", doc.concatenated(doc.paragraphs(diagnosis_summary(one)) for one in before)),
         *_law(story), *map(_added, story.rounds),
-        section("Before and after", residual_spectra(story) + _place(story)) if story.rounds else "",
-        section("What the missing effects had biased", _moved(story)),
-        section("Finally", paragraphs([conclusion(story.last), *headline(story.last)]) + bullets(evidence(story.last))
-                + concatenated(paragraphs(diagnosis_summary(one)) for one in at_last)) if story.rounds else "",
+        doc.section("Before and after", residual_spectra(story) + _place(story)) if story.rounds else "",
+        doc.section("What the missing effects had biased", _moved(story)),
+        doc.section("Finally", doc.paragraphs([comparing.conclusion(story.last), *comparing.headline(story.last)])
+                    + doc.bullets(comparing.evidence(story.last))
+                    + doc.concatenated(doc.paragraphs(diagnosis_summary(one)) for one in at_last)
+                    ) if story.rounds else "",
         shape_sections(last),
-        section("What these runs cannot tell, and which drive would", bullets(untested(last))),
-        section("Sources", bullets(
+        doc.section("What these runs cannot tell, and which drive would", doc.bullets(untested(last))),
+        doc.section("Sources", doc.bullets(
             f"{one.effect.name} ({one.effect.title}): {one.effect.source}" for one in story.last.effects)),
     ])
 
 
-def _story_tiles(story: Story) -> Html:
-    return tiles([
+def _story_tiles(story: Story) -> doc.Html:
+    return doc.tiles([
         ("NRMSE as filed", f"{steps(story)[0][1]:.3f}", "as recorded"),
         ("NRMSE finally", f"{steps(story)[-1][1]:.3f}", "refitted"),
         ("Noise floor", f"{story.floor:.3f}", "NRMSE"),
@@ -410,40 +386,41 @@ def _story_tiles(story: Story) -> Html:
     ])
 
 
-def _steps(story: Story) -> Html:
+def _steps(story: Story) -> doc.Html:
     rows = [(f"{number}", words, f"{error:.4f}") for number, (words, error) in enumerate(steps(story))]
     return (falling(f"NRMSE on {JUDGED_ON}", steps(story), story.floor)
-            + grid(("Step", "Model", "NRMSE"), rows, words=(0, 1)) + hint(STEPS_HINT))
+            + doc.grid(("Step", "Model", "NRMSE"), rows, words=(0, 1)) + doc.hint(STEPS_HINT))
 
 
-def _law(story: Story) -> list[Html]:
+def _law(story: Story) -> list[doc.Html]:
     """The law that was looked for; nothing where none was."""
     sought = story.law
     if sought is None:
         return []
     if sought.learning.law is None or sought.addition is None:
         said = why_none(sought.learning)
-        return [section("A law learned from the runs", paragraphs([f"{said[0].upper()}{said[1:]}."]))]
-    return [section("A law learned from the runs", paragraphs(
+        return [doc.section("A law learned from the runs", doc.paragraphs([f"{said[0].upper()}{said[1:]}."]))]
+    return [doc.section("A law learned from the runs", doc.paragraphs(
         [*sentences(sought.learning.law, sought.addition), f"Written to {sought.file}."])),
         *law_sections(sought.learning.law, sought.addition, sought.picture)]
 
 
-def _added(one: Round) -> Html:
+def _added(one: Round) -> doc.Html:
     effects = [f"Signature: {new.effect.signature}." for new in one.addition.new]
-    rows = [(which, f"{error:.4f}", what) for which, error, what in errors(one.addition)]
-    said = paragraphs([*judgement(one.addition), *effects, f"Written to {one.file}."])
-    return section(f"Added: {' and '.join(one.addition.names)}",
-                   said + grid(("", "NRMSE", ""), rows, words=(0, 2)))
+    rows = [(which, f"{error:.4f}", what) for which, error, what in comparing.errors(one.addition)]
+    said = doc.paragraphs([*comparing.judgement(one.addition), *effects, f"Written to {one.file}."])
+    return doc.section(f"Added: {' and '.join(one.addition.names)}",
+                       said + doc.grid(("", "NRMSE", ""), rows, words=(0, 2)))
 
 
-def _moved(story: Story) -> Html:
+def _moved(story: Story) -> doc.Html:
     if not story.moved:
-        return EMPTY
-    return grid(MOVED_HEADS, moved_rows(story.moved), words=(0, 5)) + hint(MOVED_HINT)
+        return doc.EMPTY
+    return doc.grid(comparing.MOVED_HEADS, comparing.moved_rows(story.moved), words=(0, 5)) + doc.hint(
+        comparing.MOVED_HINT)
 
 
-def residual_spectra(story: Story) -> Html:
+def residual_spectra(story: Story) -> doc.Html:
     """The residual before and after, by frequency."""
     before, after = story.first.refitted.residuals, story.last.refitted.residuals
     f_hz = frequencies(before)
@@ -460,10 +437,10 @@ def residual_spectra(story: Story) -> Html:
     return chart(Curves("By frequency", "frequency [Hz]", f"power spectral density [dB re 1 ({unit})2/Hz]", lines))
 
 
-def _place(story: Story) -> Html:
+def _place(story: Story) -> doc.Html:
     """The place that was worst at first, then and now."""
     before, after = story.first.refitted, story.last.refitted
-    worst, residuals = worst_moment(before), before.residuals
+    worst, residuals = comparing.worst_moment(before), before.residuals
     index, part = worst.run, worst.part
     residual = residuals.residual[index]
     time_s = (residuals.runs[index].first + np.arange(len(residual)))[part] / residuals.rate_hz
@@ -499,7 +476,7 @@ def _row(name: str, found: dict[str, Any]) -> tuple[str, ...]:
 
 
 def field_page(title: str, about: Sequence[str], measured: Sequence[MapLine], driven: Sequence[MapLine], story: Story,
-         before: Assessment, after: Assessment, answer: Sequence[str]) -> Html:
+         before: Assessment, after: Assessment, answer: Sequence[str]) -> doc.Html:
     """The whole of it as one HTML document.
 
     about             what the drives are, a paragraph each
@@ -507,24 +484,25 @@ def field_page(title: str, about: Sequence[str], measured: Sequence[MapLine], dr
     before, after     the road of a drive that the lab did not see, by the file as it was and by the last one
     answer            what is true, where that is known
     """
-    return document(title, [
-        heading(title, ", ".join(one.name for one in driven)),
-        _field_tiles(story, before, after), paragraphs(about),
-        section("The drives", ways_map(measured, driven) + hint(
+    return doc.document(title, [
+        doc.heading(title, ", ".join(one.name for one in driven)),
+        _field_tiles(story, before, after), doc.paragraphs(about),
+        doc.section("The drives", ways_map(measured, driven) + doc.hint(
             "Wide: the measured lines. Dots: the car's GPS positions, one a second.")),
-        section("NRMSE, model by model", falling(f"NRMSE on {JUDGED_ON}", steps(story), story.floor)
-                + paragraphs(ending(story))),
-        section("What was missing", concatenated(paragraphs(diagnosis_summary(one)) for one in story.diagnoses[:1])),
-        section("Before and after", residual_spectra(story)) if story.rounds else "",
-        section("The IRI of a drive that the lab did not see", _iri(before, after)
-                + grid(HEADS, rows(before, after), words=(0,)) + hint(IN_HINT)),
-        section("The answer", bullets(answer)),
+        doc.section("NRMSE, model by model", falling(f"NRMSE on {JUDGED_ON}", steps(story), story.floor)
+                    + doc.paragraphs(ending(story))),
+        doc.section("What was missing", doc.concatenated(
+            doc.paragraphs(diagnosis_summary(one)) for one in story.diagnoses[:1])),
+        doc.section("Before and after", residual_spectra(story)) if story.rounds else "",
+        doc.section("The IRI of a drive that the lab did not see", _iri(before, after)
+                    + doc.grid(HEADS, rows(before, after), words=(0,)) + doc.hint(IN_HINT)),
+        doc.section("The answer", doc.bullets(answer)),
     ])
 
 
-def _field_tiles(story: Story, before: Assessment, after: Assessment) -> Html:
+def _field_tiles(story: Story, before: Assessment, after: Assessment) -> doc.Html:
     first, last = (figures_of(one)["comparison"] for one in (before, after))
-    return tiles([
+    return doc.tiles([
         ("Bias of the IRI, initially", f"{first['bias']:+.1%}", f"R2 {first['r2']:.2f}"),
         ("finally", f"{last['bias']:+.1%}", f"R2 {last['r2']:.2f}"),
         ("NRMSE, initially", f"{steps(story)[0][1]:.3f}", "as filed"),
@@ -532,7 +510,7 @@ def _field_tiles(story: Story, before: Assessment, after: Assessment) -> Html:
     ])
 
 
-def _iri(before: Assessment, after: Assessment) -> Html:
+def _iri(before: Assessment, after: Assessment) -> doc.Html:
     exact = np.isfinite(after.exact_m_per_km)
     lines = (_line("finally", after, True), _line("initially", before, False),
              Line("truth", _middles_m(after)[exact], after.exact_m_per_km[exact]))

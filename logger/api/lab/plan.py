@@ -30,20 +30,7 @@ from logger.lab.planning.plan import plan as planned_by_lab
 from logger.lab.planning.planned_drive import DriveOption, PlannedCar, SensorNoise, at_speed
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.profiles.track import Track
-from logger.report.document import (
-    EMPTY,
-    Html,
-    bullets,
-    concatenated,
-    document,
-    grid,
-    heading,
-    hint,
-    html,
-    paragraphs,
-    section,
-    tiles,
-)
+from logger.report import document as doc
 from logger.report.quantities import columns, wrapped
 from logger.runs import Run
 from logger.store.formats import drive_file, profile_file, vehicle_file
@@ -84,11 +71,11 @@ class Plan(CommandResult):
     next: tuple[NextDrive, ...]
     noise_mps2: float
 
-    def figures(self) -> list[Html]:
+    def figures(self) -> list[doc.Html]:
         """The matrix of what remains of one effect when another is fitted."""
         return [figure(self.found)]
 
-    def as_page(self, of: str) -> Html:
+    def as_page(self, of: str) -> doc.Html:
         """The plan as one HTML document."""
         return page(self.found, self.vehicle)
 
@@ -274,27 +261,27 @@ def as_json(found: LabPlan) -> dict[str, Any]:
 _FULL = 100.0  # deviations that are drawn as dark as any
 
 
-def page(found: LabPlan, vehicle: str) -> Html:
+def page(found: LabPlan, vehicle: str) -> doc.Html:
     """The plan as one HTML document."""
     title = f"{vehicle}: which effects could these drives show?"
     chances = found.now.chances
-    return document(title, [
-        heading(title, ", ".join(f"{name}, {seconds:.0f} s" for name, seconds in found.drives)),
-        tiles([("Effects that could be named", f"{int((chances > 0.5).sum())}", f"of {len(found.names)}"),
-               ("Too faint", f"{int((found.now.detectability < DETECTABLE_SIGMA).sum())}", ""),
-               ("Groups not distinguished", f"{len(found.groups)}", ""),
-               ("Noise", f"{found.noise.variance**0.5:.3g}", "m/s2 r.m.s.")]),
-        paragraphs(summary(found)),
-        section("Which effects are distinguished", figure(found) + hint(meaning())),
-        section("Each effect", grid(HEADS, rows(found), words=(0, 3, 4))),
-        section("What another drive would add", _next(found)),
-        section("Sources", bullets([
+    return doc.document(title, [
+        doc.heading(title, ", ".join(f"{name}, {seconds:.0f} s" for name, seconds in found.drives)),
+        doc.tiles([("Effects that could be named", f"{int((chances > 0.5).sum())}", f"of {len(found.names)}"),
+                   ("Too faint", f"{int((found.now.detectability < DETECTABLE_SIGMA).sum())}", ""),
+                   ("Groups not distinguished", f"{len(found.groups)}", ""),
+                   ("Noise", f"{found.noise.variance**0.5:.3g}", "m/s2 r.m.s.")]),
+        doc.paragraphs(summary(found)),
+        doc.section("Which effects are distinguished", figure(found) + doc.hint(meaning())),
+        doc.section("Each effect", doc.grid(HEADS, rows(found), words=(0, 3, 4))),
+        doc.section("What another drive would add", _next(found)),
+        doc.section("Sources", doc.bullets([
             "G. Cowan, K. Cranmer, E. Gross, O. Vitells, European Physical Journal C 71, 1554 (2011): what is expected "
             "to be found, from one data set without noise."])),
     ])
 
 
-def figure(found: LabPlan) -> Html:
+def figure(found: LabPlan) -> doc.Html:
     """The matrix: each row an effect that is there; in its own column how far it stands out, in the others what remains
     when that one is fitted in its place. Those that stand out most first."""
     order = np.argsort(-found.now.detectability, kind="stable")
@@ -304,15 +291,15 @@ def figure(found: LabPlan) -> Html:
                     ISOLABLE_SIGMA, _FULL)
 
 
-def _next(found: LabPlan) -> Html:
+def _next(found: LabPlan) -> doc.Html:
     """Nothing where there is none."""
     if not found.next:
-        return EMPTY
-    drawn = grid(("Drive", "More named", "Standard deviations gained"), [
+        return doc.EMPTY
+    drawn = doc.grid(("Drive", "More named", "Standard deviations gained"), [
         (do_words(one.option), f"{one.more_named:.1f}",
          ", ".join(f"{name} {number(each)}" for name, each in list(one.gains.items())[:6])) for one in found.next],
         words=(0, 2))
-    return drawn + hint(f"{GAIN_HINT} {SENSOR_HINT}")
+    return drawn + doc.hint(f"{GAIN_HINT} {SENSOR_HINT}")
 
 
 _CELL_PX, _HIGH_PX, _LEFT_PX, _TOP_PX, _ROOM_PX = 40, 24, 190, 150, 60
@@ -320,31 +307,31 @@ _FAINTEST, _DARKEST = 0.12, 0.9
 _WHITE_FROM = 0.5
 
 
-def heat_map(title: str, names: Sequence[str], values: Array, least: float, full: float) -> Html:
+def heat_map(title: str, names: Sequence[str], values: Array, least: float, full: float) -> doc.Html:
     """The figure element of values (n, n): one row and one column for each name, the diagonal framed.
 
     What is below ``least`` is red, what is above it blue, and darker up to ``full``.
     """
     width, height = _LEFT_PX + _CELL_PX * len(names) + _ROOM_PX, _TOP_PX + _HIGH_PX * len(names) + 8
-    heads = concatenated(
-        html('<text transform="translate({:.0f} {}) rotate(-55)">{}</text>', _LEFT_PX + _CELL_PX * (column + 0.5),
-             _TOP_PX - 8, name) for column, name in enumerate(names))
-    rows = concatenated(
-        html('<text x="{}" y="{}" text-anchor="end">{}</text>', _LEFT_PX - 8, _TOP_PX + _HIGH_PX * row + 17, name)
-        + concatenated(_cell(row, column, float(values[row, column]), least, full) for column in range(len(names)))
+    heads = doc.concatenated(
+        doc.html('<text transform="translate({:.0f} {}) rotate(-55)">{}</text>', _LEFT_PX + _CELL_PX * (column + 0.5),
+                 _TOP_PX - 8, name) for column, name in enumerate(names))
+    rows = doc.concatenated(
+        doc.html('<text x="{}" y="{}" text-anchor="end">{}</text>', _LEFT_PX - 8, _TOP_PX + _HIGH_PX * row + 17, name)
+        + doc.concatenated(_cell(row, column, float(values[row, column]), least, full) for column in range(len(names)))
         for row, name in enumerate(names))
-    return html('<figure><figcaption>{}</figcaption><svg class="plot" viewBox="0 0 {} {}" role="img" aria-label="{}">'
-                "{}{}</svg></figure>", title, width, height, title, heads, rows)
+    return doc.html('<figure><figcaption>{}</figcaption><svg class="plot" viewBox="0 0 {} {}" role="img" '
+                    'aria-label="{}">{}{}</svg></figure>', title, width, height, title, heads, rows)
 
 
-def _cell(row: int, column: int, value: float, least: float, full: float) -> Html:
+def _cell(row: int, column: int, value: float, least: float, full: float) -> doc.Html:
     x, y = _LEFT_PX + _CELL_PX * column, _TOP_PX + _HIGH_PX * row
     share = min(max(log(max(value, least) / least) / log(full / least), 0.0), 1.0)
     shade = _FAINTEST + (_DARKEST - _FAINTEST) * share if value >= least else 0.35 * (1 - value / least) + _FAINTEST
     colour = "--c0" if value >= least else "--c4"
     frame = "stroke:var(--ink);stroke-width:1.5" if row == column else "stroke:none"
     ink = "#fff" if shade > _WHITE_FROM else "var(--ink)"
-    return html('<rect x="{}" y="{}" width="{}" height="{}" style="fill:var({});fill-opacity:{:.2f};{}"/>'
-                '<text x="{}" y="{}" text-anchor="middle" style="fill:{};font-size:11px">{}</text>',
-                x + 1, y + 1, _CELL_PX - 2, _HIGH_PX - 2, colour, shade, frame, x + _CELL_PX // 2, y + 16, ink,
-                f"{value:.1f}" if value < 10 else f"{value:.0f}")
+    return doc.html('<rect x="{}" y="{}" width="{}" height="{}" style="fill:var({});fill-opacity:{:.2f};{}"/>'
+                    '<text x="{}" y="{}" text-anchor="middle" style="fill:{};font-size:11px">{}</text>',
+                    x + 1, y + 1, _CELL_PX - 2, _HIGH_PX - 2, colour, shade, frame, x + _CELL_PX // 2, y + 16, ink,
+                    f"{value:.1f}" if value < 10 else f"{value:.0f}")

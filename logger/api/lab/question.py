@@ -5,50 +5,32 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Union
 
-from logger.api.question import (
-    ADDED,
-    NOISE,
-    SPEED,
-    Anyway,
-    Argument,
-    Candidates,
-    EffectFiles,
-    LongQuestion,
-    LowPass,
-    Option,
-    Out,
-    Runs,
-    Tolerance,
-    TrackedRuns,
-    VehicleName,
-    Verb,
-    files_of,
-    paths_of,
-)
+from logger.api import question
 
 if TYPE_CHECKING:
     from logger.store.formats.profile_file import Wheelpaths
 
 
-PAGE = Out("write a page with pictures; may repeat", others=("*",), is_drawn=False)
+PAGE = question.Out("write a page with pictures; may repeat", others=("*",), is_drawn=False)
 
 
 @dataclass(frozen=True, kw_only=True)
-class LabQuestion(LongQuestion):
+class LabQuestion(question.LongQuestion):
     """What the lab's verbs have in common; each has a ``vehicle``, ``runs`` and maybe ``effect_files`` as well."""
 
-    tolerance: Tolerance = None
-    low_pass_hz: LowPass = None
-    anyway: Anyway = False
+    tolerance: question.Tolerance = None
+    low_pass_hz: question.LowPass = None
+    anyway: question.Anyway = False
 
     def files_read(self) -> Sequence[Path]:
         given: Any = self
-        return [*super().files_read(), *files_of(given.vehicle)]
+        return [*super().files_read(), *question.files_of(given.vehicle)]
 
     def command(self, words: str) -> str:
         """A command line about the same vehicle and runs."""
         given: Any = self
-        return f"ridelog {words.format(f'--vehicle {given.vehicle}')} {' '.join(map(str, paths_of(given.runs)))}"
+        runs = " ".join(map(str, question.paths_of(given.runs)))
+        return f"ridelog {words.format(f'--vehicle {given.vehicle}')} {runs}"
 
 
 @dataclass(frozen=True)
@@ -73,8 +55,8 @@ class CompareQuestion(LabQuestion):
     (True, True)
     """
 
-    vehicle: VehicleName
-    runs: TrackedRuns
+    vehicle: question.VehicleName
+    runs: question.TrackedRuns
 
 
 @dataclass(frozen=True)
@@ -104,13 +86,13 @@ class DiagnoseQuestion(LabQuestion):
     ('sensor_gain', 1.1)
     """
 
-    vehicle: VehicleName
-    runs: TrackedRuns
+    vehicle: question.VehicleName
+    runs: question.TrackedRuns
     _: KW_ONLY
-    candidates: Candidates = None
-    effect_files: EffectFiles = ()
+    candidates: question.Candidates = None
+    effect_files: question.EffectFiles = ()
     list_all: Annotated[bool, "the words list all candidates, not the first 8"] = False
-    same_road: Annotated[bool, Option(
+    same_road: Annotated[bool, question.Option(
         "without a profile: two runs or more (folders, or drive.csv files) over one road at different speeds; "
         "nonlinear effects are tried in linearised form")] = False
 
@@ -137,17 +119,17 @@ class AddEffectQuestion(LabQuestion):
     ['sensor_gain']
     """
 
-    name: Annotated[Path | str, Argument(
+    name: Annotated[Path | str, question.Argument(
         "an effect that comes with ridelog, or the path of the Python file of one of your own",
         metavar="NAME[:PARAM=VALUE,...]", read=str)]
-    vehicle: VehicleName
-    runs: TrackedRuns
+    vehicle: question.VehicleName
+    runs: question.TrackedRuns
     _: KW_ONLY
     start: Annotated[Mapping[str, float] | None, "numbers of the effect by name, where its fit begins"] = None
 
     def files_read(self) -> Sequence[Path]:
         own = Path(str(self.name).partition(":")[0])
-        read = [one for one in super().files_read() if one not in files_of(self.vehicle)[:1]]
+        read = [one for one in super().files_read() if one not in question.files_of(self.vehicle)[:1]]
         return [*read, *([own] if own.is_file() else [])]
 
 
@@ -172,10 +154,10 @@ class LearnQuestion(LabQuestion):
     True
     """
 
-    vehicle: VehicleName
-    runs: TrackedRuns
+    vehicle: question.VehicleName
+    runs: question.TrackedRuns
     _: KW_ONLY
-    effect_files: EffectFiles = ()
+    effect_files: question.EffectFiles = ()
 
     def check_written(self, files: Mapping[str, Sequence[Path]]) -> None:
         """A page alone would lose the law."""
@@ -208,23 +190,23 @@ class PlanQuestion(LabQuestion):
     True
     """
 
-    vehicle: VehicleName
-    runs: Annotated[Runs, Argument(
+    vehicle: question.VehicleName
+    runs: Annotated[question.Runs, question.Argument(
         "folder with drive.csv and profile.csv, or of a rig excitation.csv", metavar="RUN", read=Path, many=list)] = ()
     _: KW_ONLY
-    profile: Annotated[Union["Wheelpaths", Path, str, None], Option(
+    profile: Annotated[Union["Wheelpaths", Path, str, None], question.Option(
         "the road of planned drives, and of the next one (default: that of the longest run)", metavar="FILE",
         read=Path)] = None
-    speeds_mps: Annotated[Sequence[float], Option(
-        "plan a drive over all of the profile at this speed [m/s]; may repeat", SPEED, "MPS", many=list,
+    speeds_mps: Annotated[Sequence[float], question.Option(
+        "plan a drive over all of the profile at this speed [m/s]; may repeat", question.SPEED, "MPS", many=list,
         flag="--speed")] = ()
-    noise_mps2: Annotated[float | None, Option(
-        "r.m.s. of the sensor's noise [m/s2] (default: that of the runs; without runs a usual one)", NOISE,
+    noise_mps2: Annotated[float | None, question.Option(
+        "r.m.s. of the sensor's noise [m/s2] (default: that of the runs; without runs a usual one)", question.NOISE,
         "MPS2")] = None
-    step_mps2: Annotated[float, Option(
-        "the planned sensor gives whole multiples of this only [m/s2]", ADDED, "MPS2")] = 0.0
-    candidates: Candidates = None
-    effect_files: EffectFiles = ()
+    step_mps2: Annotated[float, question.Option(
+        "the planned sensor gives whole multiples of this only [m/s2]", question.ADDED, "MPS2")] = 0.0
+    candidates: question.Candidates = None
+    effect_files: question.EffectFiles = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -256,26 +238,26 @@ class LabLoopQuestion(LabQuestion):
     ['sensor_gain']
     """
 
-    vehicle: VehicleName
-    runs: TrackedRuns
-    out: Annotated[Path | str, Option(
+    vehicle: question.VehicleName
+    runs: question.TrackedRuns
+    out: Annotated[Path | str, question.Option(
         "folder for the vehicle files and the page", metavar="DIR", read=Path)] = Path("ridelog-lab")
     _: KW_ONLY
     ask: Annotated[Callable[[str], str | None],
                    "given the name of an effect that was found missing, gives that of the one to be added, or None for "
                    "none; without it all that is missing is added"] = str
-    candidates: Candidates = None
-    effect_files: EffectFiles = ()
+    candidates: question.Candidates = None
+    effect_files: question.EffectFiles = ()
     learns: Annotated[bool, "whether a law is learned at all"] = True
 
 
-COMPARE = Verb(CompareQuestion, "logger.api.lab.compare:compared", (Out(
+COMPARE = question.Verb(CompareQuestion, "logger.api.lab.compare:compared", (question.Out(
     "write a page with pictures; .png, .svg or .pdf: the pictures alone; may repeat", others=("*",)),))
-DIAGNOSE = Verb(DiagnoseQuestion, "logger.api.lab.diagnose:diagnosed", (PAGE,))
-ADD_EFFECT = Verb(AddEffectQuestion, "logger.api.lab.compare:added", (Out(
+DIAGNOSE = question.Verb(DiagnoseQuestion, "logger.api.lab.diagnose:diagnosed", (PAGE,))
+ADD_EFFECT = question.Verb(AddEffectQuestion, "logger.api.lab.compare:added", (question.Out(
     "the new vehicle file", metavar="V2.yaml", others=("*",), many=False, is_drawn=False, required=True),))
-LEARN = Verb(LearnQuestion, "logger.api.lab.learn:law_of", (
-    Out("the law's file; FILE.html: a page with pictures; may repeat", metavar="LAW.py", others=(".py", ".html"),
-        is_drawn=False, required=True),))
-PLAN = Verb(PlanQuestion, "logger.api.lab.plan:plan_by", (PAGE,))
-LAB = Verb(LabLoopQuestion, "logger.api.lab.loop:story_of")
+LEARN = question.Verb(LearnQuestion, "logger.api.lab.learn:law_of", (
+    question.Out("the law's file; FILE.html: a page with pictures; may repeat", metavar="LAW.py",
+                 others=(".py", ".html"), is_drawn=False, required=True),))
+PLAN = question.Verb(PlanQuestion, "logger.api.lab.plan:plan_by", (PAGE,))
+LAB = question.Verb(LabLoopQuestion, "logger.api.lab.loop:story_of")

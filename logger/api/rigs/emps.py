@@ -11,16 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from logger.api.rig_sets import (
-    Improved,
-    columns_in,
-    improved,
-    pictures,
-    rig_from_folder,
-    scratch,
-    simulated,
-    write_rig_run,
-)
+from logger.api import rig_sets
 from logger.chart_data import Array
 from logger.errors import BadInput
 from logger.files import write_text
@@ -46,15 +37,15 @@ def run(folder: Path, effort: Workload) -> Result:
     force_n, place_m = _record(folder)
     count = effort.count(len(force_n), round(_FEWEST_S * RATE_HZ))
     steps = effort.each(["diagnosed", "simulated"])
-    with scratch() as place:
+    with rig_sets.scratch() as place:
         axis = place / "axis.yaml"
         write_text(axis, VEHICLE)
         next(steps)
-        bench = write_rig_run(place / "axis", RATE_HZ, {"displacement_m": place_m[:count]},
-                              {"force_n": force_n[:count]})
-        found = improved(axis, [bench])
+        bench = rig_sets.write_rig_run(place / "axis", RATE_HZ, {"displacement_m": place_m[:count]},
+                                       {"force_n": force_n[:count]})
+        found = rig_sets.improved(axis, [bench])
         next(steps)
-        made = simulated(found, bench, thin=True)
+        made = rig_sets.simulated(found, bench, thin=True)
     list(steps)
     skip = round(_SKIP_S * made.rate_hz)
     size = float(np.sqrt(np.mean(made.measured[skip:] ** 2)))
@@ -64,7 +55,7 @@ def run(folder: Path, effort: Workload) -> Result:
     ours = (numbers["mass_kg"], numbers["damping_n_s_per_m"],
             friction.parameters[FRICTION] if friction else 0.0)
     return Result((_beside(found, ours), found.effects), _verdict(found, linear, better),
-                  pictures("Force of the axis", made, "N", _SHOWN_S, skip), (
+                  rig_sets.pictures("Force of the axis", made, "N", _SHOWN_S, skip), (
         Statement("dry_friction is named first (1: yes)", "Coulomb friction",
                   float(found.diagnosis.verdict[:1] == (EFFECT,)), 1, 1, of=("EMPS friction",)),
         Statement("error of the force over the force", "Coulomb friction", better, 0.0, linear / 2,
@@ -75,20 +66,20 @@ def run(folder: Path, effort: Workload) -> Result:
 
 def _record(folder: Path) -> tuple[Array, Array]:
     """Force [N] and place [m], both (n,)."""
-    drive, place_m = columns_in(folder, "DATA_EMPS*", "the training record DATA_EMPS.mat", {
+    drive, place_m = rig_sets.columns_in(folder, "DATA_EMPS*", "the training record DATA_EMPS.mat", {
         "csv": ("vir_V", "qm_m"), "mat": ("vir", "qm")})
     if len(drive) < _FEWEST_S * RATE_HZ:
         raise BadInput(f"{folder}: expected {_FEWEST_S * RATE_HZ:g} samples or more, found {len(drive)}")
     return DRIVE_N_PER_V * drive, place_m
 
 
-def _verdict(found: Improved, linear: float, better: float) -> str:
+def _verdict(found: rig_sets.Improved, linear: float, better: float) -> str:
     names = " and ".join(found.diagnosis.verdict) or "nothing"
     return (f"diagnose names {names}. The force that moves the axis is off by {better:.3f} of its r.m.s., {linear:.3f} "
             "as a linear axis with mass and viscous friction alone.")
 
 
-def _beside(found: Improved, ours: Sequence[float]) -> Table:
+def _beside(found: rig_sets.Improved, ours: Sequence[float]) -> Table:
     """Published numbers and ours with standard errors."""
     friction = next((one for one in found.added if one.effect == EFFECT), None)
     errors = (found.standard_error("mass_kg"), found.standard_error("damping_n_s_per_m"),
@@ -104,7 +95,7 @@ STUDY = Study(
     "emps", "A linear axis that rubs: what is missing of its force", "Numbers of the axis",
     "The training record is written as a user would: a component whose bench moves it (the encoder's place) while its "
     "force is measured, and a file with a mass known to 20 % and viscous friction to 50 %.",
-    rig_from_folder("the EMPS record", _DOWNLOAD, run),
+    rig_sets.rig_from_folder("the EMPS record", _DOWNLOAD, run),
     (Item("EMPS friction", Word.AGREES, "Coulomb friction is found by name, and the force is twice as near with it."),
      Item("EMPS numbers", Word.AGREES, "Mass, viscous and Coulomb friction within 1 %.")),
     source="A. Janot, M. Gautier, M. Brunot, Nonlinear System Identification Benchmarks, 2019",

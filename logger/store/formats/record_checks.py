@@ -22,17 +22,7 @@ import numpy.typing as npt
 
 from drivers.readings import STANDARD_GRAVITY_MPS2
 from logger.bounds import SIGNAL
-from logger.dsp.repeated_samples import (
-    RepeatedSamples,
-    burst_ends,
-    find_holds,
-    find_repeats,
-    fresh_times,
-    range_ends,
-    spread,
-    still_until_s,
-    stretches_of,
-)
+from logger.dsp import repeated_samples
 from logger.errors import BadInput
 from logger.files import file_in, read_bounded
 from logger.left_out import LeftOut, counting
@@ -130,8 +120,8 @@ def even_record(t_s: Array, accel: Mapping[str, Array], others: Mapping[str, Arr
     scale = STANDARD_GRAVITY_MPS2 if asked.unit == "g" else 1.0
     samples = np.stack([scale * one for one in accel.values()], axis=1)
     doubts = [] if asked.unit is not None else unit_doubts(samples, file, moving)
-    repeats = find_repeats(samples)
-    held = find_holds(t_s, samples) if repeats is None else np.zeros(len(samples), dtype=np.bool_)
+    repeats = repeated_samples.find_repeats(samples)
+    held = repeated_samples.find_holds(t_s, samples) if repeats is None else np.zeros(len(samples), dtype=np.bool_)
     doubts += hold_doubts(t_s, held, file)
     if moving is None or moving.any():
         driven = slice(None) if moving is None else moving
@@ -141,8 +131,9 @@ def even_record(t_s: Array, accel: Mapping[str, Array], others: Mapping[str, Arr
         doubts += still_doubts(accel, t_s[driven], samples[driven], held[driven])
     if repeats is not None and asked.resample_hz is None:
         even_rate_hz(t_s, file, _MEND)
-        raise BadInput(f"{file}: {repeats.complaint} ({1 / np.median(np.diff(fresh_times(repeats, t_s))):.3g} Hz "
-                       f"written at {_rate_hz(t_s):.4g}): --resample drops the repeats")
+        fresh_hz = 1 / np.median(np.diff(repeated_samples.fresh_times(repeats, t_s)))
+        raise BadInput(f"{file}: {repeats.complaint} ({fresh_hz:.3g} Hz written at {_rate_hz(t_s):.4g}): "
+                       "--resample drops the repeats")
     kept = ~held if repeats is None else repeats.fresh
     doubts += [doubt for name, axis in zip(accel, samples[kept].T, strict=True) for doubt in end_doubts(name, axis)]
     if asked.resample_hz is None:
@@ -157,7 +148,7 @@ def hold_doubts(t_s: Array, held: Bools, file: str) -> list[Doubt]:
     mostly = 0.5  # of the samples: the recorder is slow, and did not stop for a while
     if not held.any():
         return []
-    first, end = stretches_of(held)
+    first, end = repeated_samples.stretches_of(held)
     begin_s, end_s = t_s[first - 1], t_s[np.minimum(end, len(t_s) - 1)]
     lasted_s, row = end_s - begin_s, int(np.argmax(end_s - begin_s))
     if (share := float(held.mean())) > mostly:
@@ -206,14 +197,14 @@ _MEND = " (--resample lays samples on an even grid)"
 
 
 def _resampled(t_s: Array, samples: Array, names: Mapping[str, Array], others: Mapping[str, Array],
-               repeats: RepeatedSamples | None, held: Bools, file: str, rate_hz: float,
+               repeats: repeated_samples.RepeatedSamples | None, held: Bools, file: str, rate_hz: float,
                doubts: list[Doubt]) -> EvenRecord:
     from logger.dsp.whole_record import mean_rate_hz, on_even_grid
 
     times_s = even_times_of(t_s, file)
     taken_s, taken = times_s, samples
     if repeats is not None:
-        taken_s, taken = fresh_times(repeats, times_s), samples[repeats.fresh]
+        taken_s, taken = repeated_samples.fresh_times(repeats, times_s), samples[repeats.fresh]
     elif held.any():
         taken_s, taken = times_s[~held], samples[~held]
     steps = np.diff(taken_s)
@@ -245,10 +236,10 @@ def even_times_of(t_s: Array, file: str) -> Array:
     if (back := np.diff(t_s) < 0).any():
         row = int(np.argmax(back)) + 1
         raise BadInput(f"{place(file, row)}: expected no time before {t_s[row - 1]:.10g} s, found {t_s[row]:.10g}")
-    ends = burst_ends(t_s)
+    ends = repeated_samples.burst_ends(t_s)
     if ends is not None:
         try:
-            return spread(t_s, ends)
+            return repeated_samples.spread(t_s, ends)
         except ValueError as error:
             raise BadInput(f"{file}: expected samples that were taken at some even rate, {error}") from None
     check_grows(t_s, file)
@@ -285,7 +276,7 @@ def still_doubts(names: Iterable[str], t_s: Array, samples: Array, held: Bools) 
     """Axes of samples (n, axes) that never move, or stand still for long where the others, which were ``held`` (n,) at
     times, do not; and a beginning in which none moves: a parked car or a sensor that was not read."""
     doubts = []
-    begin_s = still_until_s(t_s, samples) - t_s[0]
+    begin_s = repeated_samples.still_until_s(t_s, samples) - t_s[0]
     if begin_s > WIDEST_STEP_S and not held[1] and np.ptp(samples, axis=0).any():
         doubts.append(Doubt("held", f"the sensor stands still on all axes for the first {begin_s:.3g} s: a parked car, "
                             "or it was not read; the ride after it is harder than the values say: cut it off",
@@ -296,8 +287,9 @@ def still_doubts(names: Iterable[str], t_s: Array, samples: Array, held: Bools) 
                                 "shows some noise at least; check that it was read",
                                 {"axis": name, "value_mps2": float(values[0])}))
             continue
-        alone = find_holds(t_s, values[:, None]) & ~held if len(samples.T) > 1 else np.zeros(0, dtype=np.bool_)
-        first, end = stretches_of(alone)
+        alone = (repeated_samples.find_holds(t_s, values[:, None]) & ~held if len(samples.T) > 1
+                 else np.zeros(0, dtype=np.bool_))
+        first, end = repeated_samples.stretches_of(alone)
         long = t_s[end - 1] - t_s[first - 1] > WIDEST_STEP_S if len(first) else np.zeros(0, dtype=np.bool_)
         if long.any():
             lasts_s = float((t_s[end - 1] - t_s[first - 1])[long].sum())
@@ -311,7 +303,7 @@ def end_doubts(name: str, values: Array) -> list[Doubt]:
     """Where samples (n,) of an axis stand at an end of the sensor's range."""
     return [Doubt("range_end", f"{one.samples} samples of {name} stand at {one.at:.4g} m/s2, the end of a range: the "
                   "ride is harder than the values say; record with a larger range",
-                  {"at_mps2": one.at, "samples": one.samples}) for one in range_ends(values)]
+                  {"at_mps2": one.at, "samples": one.samples}) for one in repeated_samples.range_ends(values)]
 
 
 NOT_SENSORS = (SPEED, DISTANCE, *PLACE, USABLE)  # Columns of a drive that say where and how the car went
@@ -354,9 +346,9 @@ def read_channels(path: Path | str, only: Sequence[str] = ()) -> ChannelRecord:
         if not samples[:, column].std() > 1e-12 * np.abs(samples[:, column]).max():
             raise BadInput(f"{place(file, 0)}: expected {name} to move, found {samples[0, column]:g} all along; "
                            "leave its column out")
-    if repeats := find_repeats(samples):
+    if repeats := repeated_samples.find_repeats(samples):
         raise BadInput(f"{file}: {repeats.complaint}: write a record only as often as the sensor is read")
-    hold_doubts(table[:, 0], find_holds(table[:, 0], samples), file)
+    hold_doubts(table[:, 0], repeated_samples.find_holds(table[:, 0], samples), file)
     return ChannelRecord(wanted[1:], float(table[0, 0]), even_rate_hz(table[:, 0], file), samples)
 
 

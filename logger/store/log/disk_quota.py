@@ -11,16 +11,7 @@ from pathlib import Path
 
 from drivers.disk import FileSystem
 from drivers.dump import DumpHeader, DumpWriter, Event, intact_bytes
-from logger.store.log.atomic_file import (
-    READ_ONLY,
-    Warn,
-    disk_words,
-    file_size,
-    is_file,
-    is_taken,
-    set_aside_if_possible,
-    warn_in_journal,
-)
+from logger.store.log import atomic_file
 from logger.store.log.log_name import OwnFile
 from logger.units import US_PER_S
 
@@ -123,14 +114,14 @@ class DumpRecording:
         self._number += 1
 
     def _fail(self, error: OSError) -> None:
-        why = disk_words(error)
+        why = atomic_file.disk_words(error)
         if why != self.trouble:
             log.error("recording stopped: %s", why)
         self.trouble = why
         self._retry_us = self._now_us() + RETRY_US
 
 
-def repair_recordings(directory: Path, files: FileSystem, warn: Warn = warn_in_journal) -> None:
+def repair_recordings(directory: Path, files: FileSystem, warn: atomic_file.Warn = atomic_file.warn_in_journal) -> None:
     """End the dumps that were left open, at the last block that is intact; one without any goes.
 
     A file on which the disk fails is left as it is, and named.
@@ -145,10 +136,10 @@ def repair_recordings(directory: Path, files: FileSystem, warn: Warn = warn_in_j
             else:
                 files.remove(part)
         except OSError as error:
-            if not is_file(part):
-                set_aside_if_possible(files, part, disk_words(error), warn)
+            if not atomic_file.is_file(part):
+                atomic_file.set_aside_if_possible(files, part, atomic_file.disk_words(error), warn)
             else:
-                warn(f"{part.name}: {disk_words(error)}; it stays as it is until the next start")
+                warn(f"{part.name}: {atomic_file.disk_words(error)}; it stays as it is until the next start")
 
 
 def _finish(files: FileSystem, part: Path) -> None:
@@ -366,20 +357,20 @@ class DiskQuota:
     def why_no_dumps(self) -> str:
         """Why no raw bytes may be recorded; empty: they may."""
         if self._read_only:
-            return READ_ONLY
+            return atomic_file.READ_ONLY
         return "little room is left, and it is kept for the logs" if self._dumps_held else ""
 
     @property
     def why_no_logs(self) -> str:
         """Why no rows may be written; empty: they may."""
         if self._read_only:
-            return READ_ONLY
+            return atomic_file.READ_ONLY
         return "no room is left, and nothing that could be removed" if self._logs_held else ""
 
     def _measure(self) -> int:
         room = self._files.free_bytes(self._directory) - self._limits.floor_bytes
         if self._limits.quota_bytes is not None:
-            used = sum(file_size(path) or 0 for path in self._directory.iterdir())
+            used = sum(atomic_file.file_size(path) or 0 for path in self._directory.iterdir())
             room = min(room, self._limits.quota_bytes - used)
         return room
 
@@ -389,14 +380,15 @@ class DiskQuota:
         found = []
         for path in self._directory.iterdir():
             own = OwnFile.of(path.name)
-            if own is None or own.is_open or not is_file(path):
+            if own is None or own.is_open or not atomic_file.is_file(path):
                 continue
-            if own.kind == ".json" and any(is_taken(path.with_suffix(ending)) for ending in (".csv", ".csv.part")):
+            if own.kind == ".json" and any(atomic_file.is_taken(path.with_suffix(ending))
+                                           for ending in (".csv", ".csv.part")):
                 continue
             is_dump = own.kind == ENDING
             sidecar = path.with_suffix(".json")
-            paths = (path, sidecar) if own.kind == ".csv" and is_taken(sidecar) else (path,)
-            size_bytes = sum(file_size(each) or 0 for each in paths)
+            paths = (path, sidecar) if own.kind == ".csv" and atomic_file.is_taken(sidecar) else (path,)
+            size_bytes = sum(atomic_file.file_size(each) or 0 for each in paths)
             is_exported = all(each.name in exported for each in paths)
             found.append((own.session, own.part, _Kept(paths, size_bytes, is_dump, is_exported)))
         return [kept for *_, kept in sorted(found, key=lambda entry: entry[:2])]

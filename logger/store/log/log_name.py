@@ -18,16 +18,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from drivers.disk import FileSystem
-from logger.store.log.atomic_file import (
-    Warn,
-    disk_words,
-    file_words,
-    is_taken,
-    numbered,
-    replace_file,
-    set_aside_if_possible,
-    warn_in_journal,
-)
+from logger.store.log import atomic_file
 
 
 def inside_of(folder: Path) -> Iterator[Path]:
@@ -121,7 +112,8 @@ COUNTER_NAME = "last-session"
 COUNTER = re.compile(COUNTER_NAME + r"(-[0-9]+)?")
 
 
-def next_session(directory: Path, files: FileSystem | None = None, warn: Warn = warn_in_journal) -> int:
+def next_session(directory: Path, files: FileSystem | None = None,
+                 warn: atomic_file.Warn = atomic_file.warn_in_journal) -> int:
     """A session number that no file of the folder has or ever had, stored before it is given out.
 
     It counts on from the counter file and from the names that are there, whichever is higher, so that neither a
@@ -136,22 +128,22 @@ def next_session(directory: Path, files: FileSystem | None = None, warn: Warn = 
     return number
 
 
-def _store_counter(files: FileSystem, path: Path, number: int, warn: Warn) -> None:
+def _store_counter(files: FileSystem, path: Path, number: int, warn: atomic_file.Warn) -> None:
     """Store it under the first name that takes it."""
     text = str(number)
-    for counter in numbered(path):
-        is_in_the_way = is_taken(counter)
+    for counter in atomic_file.numbered(path):
+        is_in_the_way = atomic_file.is_taken(counter)
         try:
-            replace_file(files, counter, [f"{text} {_check(text)}\n".encode()])
+            atomic_file.replace_file(files, counter, [f"{text} {_check(text)}\n".encode()])
         except OSError as error:
             if not is_in_the_way:
                 raise
-            warn(f"{counter.name}: {file_words(error)}; it cannot be replaced, and another is kept")
+            warn(f"{counter.name}: {atomic_file.file_words(error)}; it cannot be replaced, and another is kept")
         else:
             return
 
 
-def _read_counter(files: FileSystem, path: Path, warn: Warn) -> int:
+def _read_counter(files: FileSystem, path: Path, warn: atomic_file.Warn) -> int:
     """The last number given out; 0 when the file is missing, damaged or cannot be read."""
     most_bytes = 64
     try:
@@ -160,7 +152,7 @@ def _read_counter(files: FileSystem, path: Path, warn: Warn) -> int:
     except FileNotFoundError:
         return 0
     except OSError as error:
-        set_aside_if_possible(files, path, disk_words(error), warn)
+        atomic_file.set_aside_if_possible(files, path, atomic_file.disk_words(error), warn)
         return 0
     return int(text) if check == _check(text) and text.isdecimal() else 0
 

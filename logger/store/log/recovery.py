@@ -11,19 +11,7 @@ from typing import Any
 
 from drivers.disk import FileSystem
 from logger.printable import counted
-from logger.store.log.atomic_file import (
-    Warn,
-    disk_words,
-    file_words,
-    is_file,
-    is_taken,
-    name_of_temporary,
-    replace_file,
-    set_aside,
-    set_aside_if_possible,
-    warn_in_journal,
-    write_temporary,
-)
+from logger.store.log import atomic_file
 from logger.store.log.log_name import COUNTER, LogName, OwnFile, finished_path, open_path, sidecar_path
 from logger.store.log.row_format import HEADER, as_now, format_row
 from logger.store.log.sidecar import (
@@ -68,7 +56,8 @@ class Repaired:
         return f"finished {self.finished.name}: {counted(self.tally.rows, 'row')}; left out {damaged}"
 
 
-def repair(directory: Path, files: FileSystem | None = None, warn: Warn = warn_in_journal) -> list[Repaired]:
+def repair(directory: Path, files: FileSystem | None = None,
+           warn: atomic_file.Warn = atomic_file.warn_in_journal) -> list[Repaired]:
     """Put the folder right after a service that was killed: finish its parts, in order of their names.
 
     Every intact row is kept; damaged lines are left out and counted in the sidecar; UTC is filled in where the
@@ -80,46 +69,47 @@ def repair(directory: Path, files: FileSystem | None = None, warn: Warn = warn_i
         _clear(files, path, warn)
     sessions: dict[int, list[Path]] = defaultdict(list)
     for path in directory.iterdir():
-        if (name := LogName.of(path)) and is_file(path):
+        if (name := LogName.of(path)) and atomic_file.is_file(path):
             sessions[name.session].append(path)
     done = [repaired for _, logs in sorted(sessions.items()) for repaired in _repair_session(files, logs, warn)]
     for sidecar in list(directory.glob("*.json")):
         log = sidecar.with_suffix(".csv")
-        if LogName.of(log) and not is_taken(log) and not is_taken(open_path(log)):
+        if LogName.of(log) and not atomic_file.is_taken(log) and not atomic_file.is_taken(open_path(log)):
             _remove_lone(files, sidecar, warn)
     return done
 
 
-def _clear(files: FileSystem, path: Path, warn: Warn) -> None:
+def _clear(files: FileSystem, path: Path, warn: atomic_file.Warn) -> None:
     """Remove what a cut left as temporary; put aside what has such a name, a log's or a sidecar's, and is no file."""
-    whole_name = name_of_temporary(path) or path.name
+    whole_name = atomic_file.name_of_temporary(path) or path.name
     is_temporary = whole_name != path.name
     own = OwnFile.of(whole_name)
     if not ((own is not None and own.kind in (".csv", ".json")) or (is_temporary and COUNTER.fullmatch(whole_name))):
         return
-    why = "" if is_file(path) else "not a file"
+    why = "" if atomic_file.is_file(path) else "not a file"
     if is_temporary:
         try:
             files.remove(path)
         except OSError as error:
-            why = disk_words(error)
+            why = atomic_file.disk_words(error)
         else:
             return
     if why:
-        set_aside_if_possible(files, path, why, warn)
+        atomic_file.set_aside_if_possible(files, path, why, warn)
 
 
-def _remove_lone(files: FileSystem, sidecar: Path, warn: Warn) -> None:
+def _remove_lone(files: FileSystem, sidecar: Path, warn: atomic_file.Warn) -> None:
     """Remove the sidecar of a part that had no name yet. That of a finished log that was taken away stays."""
     try:
         said = (read_sidecar(sidecar, files) or {}).get("log")
         if isinstance(said, dict) and said.get("state") == "open":
             files.remove(sidecar)
     except (ValueError, OSError) as error:
-        set_aside_if_possible(files, sidecar, disk_words(error) if isinstance(error, OSError) else str(error), warn)
+        atomic_file.set_aside_if_possible(files, sidecar, atomic_file.disk_words(error) if isinstance(error, OSError)
+                                          else str(error), warn)
 
 
-def _repair_session(files: FileSystem, logs: Sequence[Path], warn: Warn) -> list[Repaired]:
+def _repair_session(files: FileSystem, logs: Sequence[Path], warn: atomic_file.Warn) -> list[Repaired]:
     """Finish the open parts of a session, of which these are all files. Its newest clock is that of the last part
     which knows one; finished files get it first, for it is lost with the last part."""
     parts = sorted((path for path in logs if path.suffix == ".part"), key=_place)
@@ -130,32 +120,32 @@ def _repair_session(files: FileSystem, logs: Sequence[Path], warn: Warn) -> list
             if clock is not None and _may_lack_utc(files, finished):
                 _fill_if_readable(files, finished, clock, warn)
     except OSError as error:
-        return [Repaired(part, None, Tally(), file_words(error)) for part in parts]
+        return [Repaired(part, None, Tally(), atomic_file.file_words(error)) for part in parts]
     later = first_segments_later(files, logs) if parts else {}
     done = []
     for part in parts:
         try:
             done.append(repair_part(files, part, later[part], clock, warn))
         except OSError as error:
-            done.append(Repaired(part, None, Tally(), file_words(error)))
+            done.append(Repaired(part, None, Tally(), atomic_file.file_words(error)))
     return done
 
 
-def _fill_if_readable(files: FileSystem, finished: Path, clock: ClockMap, warn: Warn) -> None:
+def _fill_if_readable(files: FileSystem, finished: Path, clock: ClockMap, warn: atomic_file.Warn) -> None:
     """Give a finished file its UTC; one that cannot be read does not get it, and keeps no other from being finished."""
     try:
         tally = tally_of(files, finished)
     except OSError as error:
-        warn(f"{finished.name}: {disk_words(error)}; its rows get no UTC")
+        warn(f"{finished.name}: {atomic_file.disk_words(error)}; its rows get no UTC")
     else:
         fill_finished(files, finished, tally, clock, warn)
 
 
 def repair_part(files: FileSystem, part: Path, limit: int | None, clock: ClockMap | None,
-                warn: Warn = warn_in_journal) -> Repaired:
+                warn: atomic_file.Warn = atomic_file.warn_in_journal) -> Repaired:
     """Finish one part, but for its rows of segments from ``limit`` on. A finished file of the same name is merged."""
     finished = finished_path(part)
-    logs = (finished, part) if is_taken(finished) else (part,)
+    logs = (finished, part) if atomic_file.is_taken(finished) else (part,)
     found = IntactRows(files, logs, limit)
     tally = take_tally(found)
     if len(logs) > 1 and not (found.only_in_last or tally.contradictions or _is_damaged(files, finished)):
@@ -167,7 +157,8 @@ def repair_part(files: FileSystem, part: Path, limit: int | None, clock: ClockMa
     elif tally.rows or len(logs) > 1 or _explains_a_gap(files, part, tally, limit):
         _finish_copy(files, part, logs, _facts_of(files, part, warn), tally, clock, limit)
         if tally.contradictions:
-            set_aside(files, part, f"{tally.contradictions} of its rows are others than those in {finished.name}", warn)
+            why = f"{tally.contradictions} of its rows are others than those in {finished.name}"
+            atomic_file.set_aside(files, part, why, warn)
         else:
             files.remove(part)
             files.sync_directory(part.parent)
@@ -243,19 +234,20 @@ def finish_part(files: FileSystem, part: Path, given: dict[str, Any], tally: Tal
     return finished
 
 
-def _facts_of(files: FileSystem, log: Path, warn: Warn) -> dict[str, Any]:
+def _facts_of(files: FileSystem, log: Path, warn: atomic_file.Warn) -> dict[str, Any]:
     """What a new sidecar of a log takes over from its old one. One that is damaged or cannot be read is put aside."""
     try:
         sidecar = load_sidecar(log, files)
     except ValueError as error:
         why = f"damaged: {error}"
     except OSError as error:
-        why = disk_words(error)
+        why = atomic_file.disk_words(error)
     else:
         if sidecar is None:
             return {SETTINGS_LOST: True}
         return sidecar.content if sidecar.is_checked else sidecar.content | {UNCHECKED: True}
-    set_aside(files, sidecar_path(log), f"{why}; {finished_path(log).name} has lost its settings and clock", warn)
+    atomic_file.set_aside(files, sidecar_path(log), f"{why}; {finished_path(log).name} has lost its settings and clock",
+                          warn)
     return {SETTINGS_LOST: True}
 
 
@@ -268,7 +260,7 @@ def _finish_copy(files: FileSystem, part: Path, logs: Sequence[Path], given: dic
     filled = tally if clock is None else replace(tally, unset=0)
     if limit is not None and not tally.rows:
         filled = replace(filled, holes=(Hole(limit - tally.damaged_rows, limit - 1),))
-    temporary = write_temporary(files, finished, _lines(IntactRows(files, logs, limit), clock))
+    temporary = atomic_file.write_temporary(files, finished, _lines(IntactRows(files, logs, limit), clock))
     store_sidecar(files, part, given, "finished", filled, clock)
     files.rename(temporary, finished)
     files.sync_directory(part.parent)
@@ -276,13 +268,13 @@ def _finish_copy(files: FileSystem, part: Path, logs: Sequence[Path], given: dic
 
 
 def fill_finished(files: FileSystem, finished: Path, tally: Tally, clock: ClockMap | None,
-                  warn: Warn = warn_in_journal) -> None:
+                  warn: atomic_file.Warn = atomic_file.warn_in_journal) -> None:
     """Give UTC to the rows of a finished file that have none. What earlier repairs left out of it is still known."""
     if clock is None or not tally.unset:
         return
     given = _facts_of(files, finished, warn)
     before = repairs_of(given)
-    replace_file(files, finished, _lines(IntactRows(files, (finished,)), clock))
+    atomic_file.replace_file(files, finished, _lines(IntactRows(files, (finished,)), clock))
     store_sidecar(files, finished, given, "finished", replace(
         tally, unset=0, damaged_lines=tally.damaged_lines + before.damaged_lines,
         torn_tail=tally.torn_tail or before.torn_tail, holes=before.holes + tally.holes), clock)

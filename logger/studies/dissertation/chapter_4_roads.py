@@ -16,18 +16,9 @@ Fig 4.18: roads generated for an IRI, and the IRI that they have (4.3.4).
 import numpy as np
 
 from logger.chart_data import Curves, Line
+from logger.roads import iso8608
 from logger.roads.elevation_spectrum import classify, iri_of_road, relative_spread
 from logger.roads.iri import iri
-from logger.roads.iso8608 import (
-    CM3_M3,
-    HIGHEST_CPM,
-    IRI_PER_ROOT_GD,
-    LOWEST_CPM,
-    REFERENCE_N0_CPM,
-    gd_n0_from_iri,
-    generate,
-    road_class,
-)
 from logger.studies.drives import rav4
 from logger.studies.study import (
     Cell,
@@ -133,7 +124,7 @@ def _t4_3(effort: Workload) -> Result:
     length_m, spacing_m = 1000.0, 0.05
     roads = effort.count(60, 4)
     # One seed is one set of phases: the roads of all classes are alike but for their level.
-    found = np.array([[iri(generate(gd, length_m, spacing_m, seed), spacing_m) for _, gd, _ in PRINTED_T4_3]
+    found = np.array([[iri(iso8608.generate(gd, length_m, spacing_m, seed), spacing_m) for _, gd, _ in PRINTED_T4_3]
                       for seed in effort.each(range(roads))])
     mean, std = found.mean(axis=0), found.std(axis=0)
     gds = np.array([gd for _, gd, _ in PRINTED_T4_3])
@@ -147,19 +138,20 @@ def _t4_3(effort: Workload) -> Result:
     factor = float((mean / np.sqrt(gds)).mean())
     relation = Table("IRI = c Gd^b", (Column("number"), Column("printed, Eq 4.39", ".4f"),
                                       Column("ours, generated", ".4f"), Column("ours, computed", ".4f")),
-                     (("c", IRI_PER_ROOT_GD, factor, iri_of_road(1.0, length_m).value), ("b", 0.5, power, 0.5)))
-    verdict = (f"The relation agrees: {factor:.4f} beside the printed {IRI_PER_ROOT_GD}, and the power is one half "
-               "because the IRI's car is linear. What is left is the choice of roads: computed for waves of 0.011 to "
-               "2.83 cycle/m the factor is 0.543. It holds for a waviness of 2 and long roads only; 100 m scatter by "
-               "a tenth about it.")
+                     (("c", iso8608.IRI_PER_ROOT_GD, factor, iri_of_road(1.0, length_m).value), ("b", 0.5, power, 0.5)))
+    verdict = (f"The relation agrees: {factor:.4f} beside the printed {iso8608.IRI_PER_ROOT_GD}, and the power is one "
+               "half because the IRI's car is linear. What is left is the choice of roads: computed for waves of 0.011 "
+               "to 2.83 cycle/m the factor is 0.543. It holds for a waviness of 2 and long roads only; 100 m scatter "
+               "by a tenth about it.")
     picture = Picture(Curves("IRI of roads by degree of roughness", "root of Gd(n0) [cm^1.5]", "IRI [m/km]", (
-        Line("Eq 4.39", np.sqrt(gds), IRI_PER_ROOT_GD * np.sqrt(gds)), Line("ours", np.sqrt(gds), mean, dots=True))),
+        Line("Eq 4.39", np.sqrt(gds), iso8608.IRI_PER_ROOT_GD * np.sqrt(gds)),
+        Line("ours", np.sqrt(gds), mean, dots=True))),
         "no figure, a table of the upper limits of classes A to D")
     # Sixty roads leave an average in doubt by half a per cent, a few by more; the choice of waves makes one per cent.
     within = 0.01 + 3 * iri_of_road(1.0, length_m).std / iri_of_road(1.0, length_m).value / roads**0.5
     values = (*(Value(f"class {name}, upper limit [m/km]", limit, float(one), within * limit)
                 for (name, _, limit), one in zip(PRINTED_T4_3, mean, strict=True)),
-              Value("c of IRI = c Gd^b", IRI_PER_ROOT_GD, factor, within * IRI_PER_ROOT_GD),
+              Value("c of IRI = c Gd^b", iso8608.IRI_PER_ROOT_GD, factor, within * iso8608.IRI_PER_ROOT_GD),
               Value("b of IRI = c Gd^b", 0.5, power, 1e-3))
     return Result((table, relation), verdict, (picture,), values)
 
@@ -182,10 +174,11 @@ def _f4_3(effort: Workload) -> Result:
     rows = []
     values: list[Check] = []
     for gd in effort.each(gd_cm3):
-        rms_mm = np.array([1000 * float(np.std(generate(gd, length_m, spacing_m, seed))) for seed in range(roads)])
+        rms_mm = np.array([1000 * float(np.std(iso8608.generate(gd, length_m, spacing_m, seed)))
+                           for seed in range(roads)])
         expected = 1000 * _rms_m(gd)
         quality = dict(printed).get(gd)
-        rows.append((gd, road_class(gd), quality, expected, float(rms_mm.mean()), float(rms_mm.std())))
+        rows.append((gd, iso8608.road_class(gd), quality, expected, float(rms_mm.mean()), float(rms_mm.std())))
         values += about(_FIGURES.get(gd, ("Fig 4.5",)), [
             Value(f"r.m.s. elevation at {gd:.0f} cm3, of Eq 4.2 and ours [mm]", expected, float(rms_mm.mean()),
                   tolerance * expected)])
@@ -196,7 +189,7 @@ def _f4_3(effort: Workload) -> Result:
     asked = printed[1][0]
     values += about("Eq 4.1", [Value(
         f"Gd(n0) of a road made for {asked:.0f} cm3, by Eq 4.1 as printed [cm3]", asked / (2 * np.pi),
-        classify(generate(asked, length_m, spacing_m, 0), spacing_m).gd_n0_cm3, asked / 4,
+        classify(iso8608.generate(asked, length_m, spacing_m, 0), spacing_m).gd_n0_cm3, asked / 4,
         Word.MISPRINT)])
     table = Table(f"R.m.s. elevation of {roads} roads of 1 km", (
         Column("Gd(n0) [cm3]", ".0f"), Column("class"), Column("printed quality"),
@@ -210,7 +203,7 @@ def _f4_3(effort: Workload) -> Result:
                "uniform, not normal, and N waves at equal steps repeat after one over the step. Ours chooses the step "
                "for the road's length, so that nothing repeats.")
     place = np.arange(0, 200.0, 0.5)
-    shown = tuple(Line(f"{gd:.0f} cm3, {quality}", place, 1000 * generate(gd, 200.0, 0.5, 0)[: len(place)])
+    shown = tuple(Line(f"{gd:.0f} cm3, {quality}", place, 1000 * iso8608.generate(gd, 200.0, 0.5, 0)[: len(place)])
                   for gd, quality in printed)
     gds = np.array(gd_cm3)
     means, stds = (np.array([row[at] for row in rows], dtype=float) for at in (4, 5))
@@ -226,7 +219,8 @@ def _f4_3(effort: Workload) -> Result:
 
 def _rms_m(gd_n0_cm3: float) -> float:
     """Root of the integral of Eq 2.1 with a waviness of 2 over the waves of 4.2.1: what Eq 4.2 adds up to."""
-    return float(np.sqrt(gd_n0_cm3 * CM3_M3 * REFERENCE_N0_CPM**2 * (1 / LOWEST_CPM - 1 / HIGHEST_CPM)))
+    return float(np.sqrt(gd_n0_cm3 * iso8608.CM3_M3 * iso8608.REFERENCE_N0_CPM**2
+                         * (1 / iso8608.LOWEST_CPM - 1 / iso8608.HIGHEST_CPM)))
 
 
 F4_3 = Study("fig_4_3", "Generated roads, and how high they are", "Fig 4.3, section 4.2.2",
@@ -247,7 +241,7 @@ def _f4_16(effort: Workload) -> Result:
     sets, length_m, spacing_m = 4, 500.0, 0.1
     roads = effort.count(100, 12)
     gd = np.geomspace(*range_cm3, roads)
-    found = np.array([[iri(generate(one, length_m, spacing_m, number * roads + place), spacing_m)
+    found = np.array([[iri(iso8608.generate(one, length_m, spacing_m, number * roads + place), spacing_m)
                        for place, one in enumerate(gd.tolist())] for number in effort.each(range(sets))])
     fits = [_power_law(gd, one) for one in found]
     power, factor = _power_law(np.tile(gd, sets), found.ravel())
@@ -256,11 +250,11 @@ def _f4_16(effort: Workload) -> Result:
     terms = np.column_stack([np.ones(sets * roads), np.log(np.tile(gd, sets))])
     factor_std, power_std = (spread * np.sqrt(np.diag(np.linalg.inv(terms.T @ terms)))).tolist()
     values = about(("Fig 4.16", "Fig 4.17"), [
-        Value("c of IRI = c Gd^b", IRI_PER_ROOT_GD, factor, 0.01 + 3 * factor * factor_std),
+        Value("c of IRI = c Gd^b", iso8608.IRI_PER_ROOT_GD, factor, 0.01 + 3 * factor * factor_std),
         Value("b of IRI = c Gd^b", printed_power, power, 3 * power_std)])
     table = Table(f"Power laws through {roads} roads each", (Column("set"), Column("c", ".4f"), Column("b", ".4f")),
                   (*((f"ours, {number + 1}", one[1], one[0]) for number, one in enumerate(fits)),
-                   ("ours, all", factor, power), ("printed, Eq 4.39", IRI_PER_ROOT_GD, printed_power),
+                   ("ours, all", factor, power), ("printed, Eq 4.39", iso8608.IRI_PER_ROOT_GD, printed_power),
                    ("ours, computed", iri_of_road(1.0, length_m).value, 0.5)))
     verdict = (f"Four sets of {roads} roads lie about a power law, {factor:.3f} Gd^{power:.3f} here beside 0.5386 "
                "Gd^0.5, which is a straight line on logarithmic axes as printed. The tolerance is three standard "
@@ -268,7 +262,7 @@ def _f4_16(effort: Workload) -> Result:
                f"{100 * spread:.0f} % from road to road), and 0.01 for the choice of waves: computed over 0.011 to "
                "2.83 cycle/m the factor is 0.543.")
     dots = tuple(Line(f"set {number + 1}", gd, one, dots=True) for number, one in enumerate(found))
-    law = Line("Eq 4.39", gd, IRI_PER_ROOT_GD * gd**printed_power)
+    law = Line("Eq 4.39", gd, iso8608.IRI_PER_ROOT_GD * gd**printed_power)
     pictures = tuple(Picture(Curves(title, "Gd(n0) [cm3]", "IRI [m/km]", (*dots, law), log_x=logarithmic,
                                     log_y=logarithmic), printed)
                      for title, logarithmic, printed in (
@@ -294,7 +288,7 @@ def _f4_18(effort: Workload) -> Result:
     wanted_m_per_km = tuple(float(one) for one in range(1, 21))
     length_m, spacing_m = 500.0, 0.1
     wanted = np.array(effort.some(wanted_m_per_km, 10))
-    found = np.array([[iri(generate(gd_n0_from_iri(one), length_m, spacing_m, 1000 * number + place),
+    found = np.array([[iri(iso8608.generate(iso8608.gd_n0_from_iri(one), length_m, spacing_m, 1000 * number + place),
                            spacing_m)
                        for place, one in enumerate(wanted.tolist())] for number in effort.each(range(2))])
     slopes = [float(one @ wanted / (wanted @ wanted)) for one in found]

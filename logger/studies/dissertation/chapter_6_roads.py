@@ -15,15 +15,7 @@ import numpy as np
 
 from logger.chart_data import Curves, Field, Line
 from logger.comfort.iso2631 import COMFORT_WORDS, comfort_word
-from logger.estimation.rms_calibration import (
-    LEVELS_IRI,
-    PASSENGER_KG,
-    SPEEDS_MPS,
-    CalibrationSettings,
-    calibrate,
-    loaded,
-    rms_relation,
-)
+from logger.estimation import rms_calibration
 from logger.profiles.track import Track
 from logger.roads.iri import iri
 from logger.roads.iso8608 import IRI_PER_ROOT_GD
@@ -69,16 +61,18 @@ PRINTED_GD_CM3 = (2.0, 4096.0)
 
 def _f6_6(effort: Workload) -> Result:
     speeds = np.array(SPEEDS_MPH) * MPH_MPS
-    cars = (rav4(), loaded(rav4(), passengers=2), loaded(rav4(), sprung_mass_factor=2.0))
-    own, two, heavy = (rms_relation(known_vehicle(car), None, speeds).iri_per_accel_rms for car in cars)
-    settings = CalibrationSettings(tuple(speeds.tolist()), roads=effort.count(120, 10))
-    (drives,) = (calibrate(known_vehicle(rav4()), None, settings) for _ in effort.each(range(1)))
+    cars = (rav4(), rms_calibration.loaded(rav4(), passengers=2),
+            rms_calibration.loaded(rav4(), sprung_mass_factor=2.0))
+    own, two, heavy = (rms_calibration.rms_relation(known_vehicle(car), None, speeds).iri_per_accel_rms for car in cars)
+    settings = rms_calibration.CalibrationSettings(tuple(speeds.tolist()), roads=effort.count(120, 10))
+    (drives,) = (rms_calibration.calibrate(known_vehicle(rav4()), None, settings) for _ in effort.each(range(1)))
     rows = tuple((float(mph), slope, line.iri_per_accel_rms.slope, 100 * line.window_iri_per_accel_rms.spread,
                   *map(float, others)) for mph, slope, line, *others in
                  zip(SPEEDS_MPH, own.tolist(), drives, 100 * (two / own - 1), 100 * (heavy / own - 1), strict=True))
     table = Table("IRI per r.m.s. acceleration [m/km per m/s2] (printed as pictures only)", (
         Column("speed [mph]", ".0f"), Column("computed", ".3f"), Column("from drives", ".3f"),
-        Column("spread of 25 ft windows [%]", ".0f"), Column(f"two people of {PASSENGER_KG:g} kg more [%]", "+.1f"),
+        Column("spread of 25 ft windows [%]",
+               ".0f"), Column(f"two people of {rms_calibration.PASSENGER_KG:g} kg more [%]", "+.1f"),
         Column("twice the mass [%]", "+.1f")), rows)
     verdict = ("Fig 6.3, a scheme, goes from the response to the IRI by way of the vehicle; the rest agrees with the "
                "figures: r.m.s. acceleration grows with the root of Gd(n0), whatever the length of the road, so the "
@@ -272,14 +266,15 @@ F6_9 = Study("fig_6_9", "IRI from acceleration beside the exact one, by speed an
 
 
 def _f6_16(effort: Workload) -> Result:
-    settings = CalibrationSettings(roads=effort.count(60, 10))
-    (lines,) = (calibrate(known_vehicle(rav4()), None, settings) for _ in effort.each(range(1)))
-    mph = np.round(np.array(SPEEDS_MPS) / MPH_MPS)
+    settings = rms_calibration.CalibrationSettings(roads=effort.count(60, 10))
+    (lines,) = (rms_calibration.calibrate(known_vehicle(rav4()), None, settings) for _ in effort.each(range(1)))
+    mph = np.round(np.array(rms_calibration.SPEEDS_MPS) / MPH_MPS)
     per_iri = np.array([one.a_w_per_iri.slope for one in lines])
-    levels = np.array(LEVELS_IRI)
+    levels = np.array(rms_calibration.LEVELS_IRI)
     a_w = np.outer(per_iri, levels)
     road = random_road(5.0, 305.0, 3)
-    stepped = {number: per_window(drive_over(road, SPEEDS_MPS[number], PS_2119), PS_2119) for number in (1, 3)}
+    stepped = {number: per_window(drive_over(road, rms_calibration.SPEEDS_MPS[number], PS_2119), PS_2119)
+               for number in (1, 3)}
     checks = {number: float(np.sqrt(np.mean(one.a_w_mps2**2)) / one.exact_m_per_km.mean())
               for number, one in stepped.items()}
     table = Table("Weighted acceleration by speed (printed as pictures only)", (

@@ -23,17 +23,7 @@ from scipy.special import ndtri
 from logger.chart_data import Curves, Line
 from logger.modal.analysis import find_modes
 from logger.modal.five_storey import Masses, chain, random_response, with_damping_ratios
-from logger.studies.drives import (
-    BUMP_MPS,
-    MASS,
-    Array,
-    Conditions,
-    bump,
-    error_percent,
-    fitted,
-    record_of,
-    standard_error_percent,
-)
+from logger.studies import drives
 from logger.studies.study import Check, Column, Item, Picture, Result, Statement, Study, Table, Value, Word, Workload
 
 PRINTED_TRUE_HZ = (0.890, 2.598, 4.095, 5.261, 6.000)
@@ -88,7 +78,7 @@ def _five_modes(effort: Workload) -> Result:
     return Result((table,), verdict, (picture,), tuple(values))
 
 
-def _record(building: Masses, seed: int) -> Array:
+def _record(building: Masses, seed: int) -> drives.Array:
     """Accelerations (samples, 5) under a white force on each floor, with a tenth of noise."""
     length_s, noise_share = 300.0, 0.1
     rng = np.random.default_rng(seed)
@@ -96,7 +86,8 @@ def _record(building: Masses, seed: int) -> Array:
     return np.asarray(clean + noise_share * clean.std(axis=0) * rng.standard_normal(clean.shape))
 
 
-def _beside(name: str, printed: tuple[float, ...], true: tuple[float, ...], ours: Array, std: Array) -> list[Value]:
+def _beside(name: str, printed: tuple[float, ...], true: tuple[float, ...], ours: drives.Array,
+            std: drives.Array) -> list[Value]:
     """Two estimates of one truth differ by what both are off: theirs by what the print shows, ours by chance."""
     return [Value(name.format(mode), theirs, float(mine), abs(theirs - truth) + 3.0 * float(error) + _HALF_DIGIT)
             for mode, (theirs, truth, mine, error) in enumerate(zip(printed, true, ours, std, strict=True), start=1)]
@@ -119,10 +110,11 @@ def _mass_from_a_bump(effort: Workload) -> Result:
              ("SIPPY, nfoursid, Octave, python-control", None, None))
     scatter = 0.07  # Standard error of the mass by the record alone [%]: what any unbiased fit scatters by at least.
     at_m, lasts_s, start_kg = 8.0, 6.0, 800.0
-    fits = [fitted(record_of(bump(at_m), BUMP_MPS, lasts_s, Conditions(seed=seed)), {MASS: start_kg}, ours=True)
+    fits = [drives.fitted(drives.record_of(drives.bump(at_m), drives.BUMP_MPS, lasts_s, drives.Conditions(seed=seed)),
+                          {drives.MASS: start_kg}, ours=True)
             for seed in effort.each(range(effort.count(40, 5)))]
-    errors = np.array([error_percent(one, MASS) for one in fits])
-    given = np.array([standard_error_percent(one, MASS) for one in fits])
+    errors = np.array([drives.error_percent(one, drives.MASS) for one in fits])
+    given = np.array([drives.standard_error_percent(one, drives.MASS) for one in fits])
     rms = float(np.sqrt(np.mean(errors**2)))
     # A scatter of n draws is itself off by its share 1 / sqrt(2 n).
     near = 3.0 * scatter / np.sqrt(2 * len(errors))
