@@ -10,7 +10,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -19,23 +19,31 @@ from logger import bounds
 from logger.api.drive_questions import EstimateQuestion
 from logger.api.question import Notify, function, silent
 from logger.api.roads import Profile, read_profile, write_profile
-from logger.api.shown import CommandResult, Shown, table
+from logger.api.shown import CommandResult, Shown, checks_json, checks_lines, table
 from logger.api.vehicles import model_of
-from logger.chart_data import Array, line
+from logger.chart_data import Array, Chart, Curves, Line, line
 from logger.errors import BadInput
-from logger.estimation.batch import MIX_IRI, RESOLVED_SHARE, SPEED_CLASS_MPS, Assessment, figures, speed_classes
-from logger.estimation.sensor_noise import NOISE_MPS2
+from logger.estimation.batch import (
+    MIX_IRI,
+    RESOLVED_SHARE,
+    SPEED_CLASS_MPS,
+    Assessment,
+    Unusable,
+    assess,
+    estimable,
+    figures,
+    speed_classes,
+)
+from logger.estimation.sensor_noise import NOISE_MPS2, Sensor
 from logger.files import make_folder, together, write_text
 from logger.profiles.excitation import Excitation
-from logger.runs import UNKNOWN
+from logger.profiles.track import Track
+from logger.runs import SKIP_S, UNKNOWN
+from logger.runs import Run as Record
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats import drive_file, vehicle_file
 from logger.store.formats.drive_file import facts_beside, write_run_facts
 from logger.store.formats.record_checks import EvenRecord, RecordRules, even_columns
-
-if TYPE_CHECKING:
-    from logger.chart_data import Chart
-    from logger.estimation.sensor_noise import Sensor
-    from logger.profiles.track import Track
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -74,8 +82,6 @@ class Run(drive_file.Drive, Shown):
 
     def charts(self) -> Sequence[Chart]:
         """The acceleration over time."""
-        from logger.chart_data import Curves
-
         return [Curves("Run", "time [s]", "acceleration [m/s2]", (line("sensor", self.time_s, self.accel_z_mps2),))]
 
     @property
@@ -257,8 +263,6 @@ class Estimate(CommandResult):
 
     def charts(self) -> Sequence[Chart]:
         """The IRI along the way with its standard error, and that of the profile where it is known."""
-        from logger.chart_data import Curves, Line
-
         at_m = (self.edges_m[1:] + self.edges_m[:-1]) / 2
         known, exact = np.isfinite(self.iri_m_per_km), np.isfinite(self.iri_exact_m_per_km)
         lines = [Line("estimate", at_m[known], self.iri_m_per_km[known], self.iri_std_m_per_km[known])]
@@ -269,8 +273,6 @@ class Estimate(CommandResult):
 
 def estimated(question: EstimateQuestion) -> Estimate:
     """The answer to ``EstimateQuestion``, which says what is raised."""
-    from logger.api.shown import checks_json, checks_lines
-
     model = model_of(question.vehicle)
     drive, checked = checked_run(question.run, RecordRules(question.unit, question.resample_hz))
     found = assessed(drive, model, *sensor_of(drive, question.noise_mps2, question.step_mps2), question.window_m,
@@ -292,8 +294,6 @@ estimate = function("estimate", EstimateQuestion, estimated)
 def sensor_of(run: Run, noise_mps2: float | str | None = None, step_mps2: float | None = None) -> tuple[Sensor, bool]:
     """What a reading is, by what somebody said, or where that is None by the run's facts; and whether its noise is a
     guess and to be learnt: where nobody knows it, or ``AUTO`` is said."""
-    from logger.estimation.sensor_noise import Sensor
-
     step_mps2 = (run.facts.step_mps2 or 0.0) if step_mps2 is None else step_mps2
     known_mps2 = run.facts.noise_mps2 if noise_mps2 is None else noise_mps2
     if known_mps2 is None or isinstance(known_mps2, str):
@@ -306,8 +306,6 @@ def assessed(run: Run, model: vehicle_file.CarModel, sensor: Sensor, learns_nois
     """The road of a run, in windows; where the noise is to be learnt, the sensor's is a guess. BadInput ("file:line:
     expected ...") for a drive that cannot be used, and for a profile of another road, unless the user wants to go on
     ``anyway`` (then ``warn`` is called)."""
-    from logger.estimation.batch import Unusable, assess, estimable
-
     if run.excitation is not None:
         raise BadInput(f"{run.path}: expected a drive over a road, found a run that is driven by time")
     road = None if run.profile is None else drive_file.track_of(run.profile)
@@ -328,10 +326,7 @@ def _check_road(run: Run, distance_m: Array, road: Track, model: vehicle_file.Ca
                 anyway: bool) -> None:
     """Raise BadInput where a profile that an estimate is compared with is of another road. Effects of the model are
     left out: whether it is the road can be decided without them, and some take long."""
-    from logger.api.lab.checks import check_roads
-    from logger.runs import SKIP_S
-    from logger.runs import Run as Record
-    from logger.simulation.virtual_drive import SimulatedRuns
+    from logger.api.lab.checks import check_roads  # loads the lab
 
     if len(distance_m) > SKIP_S * run.rate_hz + 2:
         record = Record(str(run.path), run.rate_hz, run.accel_z_mps2, distance_m, run.speed_mps, road)

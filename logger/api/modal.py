@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import degrees, floor, isfinite, log10
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import numpy.typing as npt
@@ -20,9 +20,14 @@ from logger.api.drives import read_run
 from logger.api.question import COMMON_IRI, COMMON_SPEED_MPS, IRI, SPEED, function
 from logger.api.shown import CommandResult, Shown, table
 from logger.api.vehicles import Model, model_of
-from logger.chart_data import Array, line
+from logger.chart_data import Array, Chart, Curves, Line, line
 from logger.errors import BadInput
-from logger.modal.mode import FoundMode, ModalResult
+from logger.estimation.car_response import WAVE_NUMBERS_CPM
+from logger.estimation.road_spectrum import RoadSpectrum
+from logger.modal.analysis import decays, find_modes
+from logger.modal.decay import decrement_mode
+from logger.modal.driven_car import car_modes
+from logger.modal.mode import FoundMode, ModalResult, pole_rows
 from logger.printable import counted
 from logger.report.quantities import known
 from logger.runs import READING, SKIP_S
@@ -32,10 +37,9 @@ from logger.store.formats.record_checks import SPEED as SPEED_COLUMN
 from logger.store.formats.record_checks import ChannelRecord
 from logger.store.formats.record_file import VERTICAL
 from logger.store.formats.vehicle_file import check_moves_itself
-
-if TYPE_CHECKING:
-    from logger.chart_data import Chart
-
+from logger.vehicle.linearise import known_vehicle
+from logger.vehicle.modes import mode_errors
+from logger.vehicle.uncertain import cars_off
 
 Complex = npt.NDArray[np.complex128]
 
@@ -72,8 +76,6 @@ class Modes(CommandResult):
 
     def charts(self) -> Sequence[Chart]:
         """The stabilisation diagram: the poles of every order that was tried; nothing where there are none."""
-        from logger.chart_data import Curves, Line
-
         if not len(self.poles):
             return ()
         return [Curves("Stabilisation diagram", "frequency [Hz]", "order", (
@@ -97,8 +99,6 @@ def asked_modes(question: ModesCommand) -> CommandResult:
 
 def _modes_by(found: Found, name: str) -> Modes:
     """What was found of a record of this name, to be shown."""
-    from logger.modal.mode import pole_rows
-
     result, kept, many = found.result, found.record, found.result.modes
     frequency_hz, frequency_std_hz, damping_ratio, damping_std = (
         np.array([getattr(one, column) for one in many], dtype=np.float64)
@@ -138,12 +138,6 @@ def vehicle_modes(
     >>> vehicle_modes("rav4-2009").frequency_hz.round(2).tolist()
     [1.12, 1.48, 10.74, 10.84]
     """
-    from logger.estimation.car_response import WAVE_NUMBERS_CPM
-    from logger.estimation.road_spectrum import RoadSpectrum
-    from logger.vehicle.linearise import known_vehicle
-    from logger.vehicle.modes import mode_errors
-    from logger.vehicle.uncertain import cars_off
-
     IRI.check("iri_m_per_km", iri_m_per_km)
     SPEED.check("speed_mps", speed_mps)
     model = model_of(vehicle)
@@ -240,9 +234,6 @@ def _picked(given: record_checks.ChannelRecord, wanted: Sequence[str]) -> Channe
 def _find(question: ModesQuestion, record: Channels, inputs: Array | None) -> tuple[ModalResult, str]:
     """What was found, and by which method. ValueError for a record that is too short or of another kind, or an input
     that shows nothing."""
-    from logger.modal.analysis import decays, find_modes
-    from logger.modal.decay import decrement_mode
-
     method = question.method
     decay = inputs is None and decays(record.samples)
     if method in _ONLY_DECAYS and not decay:
@@ -262,8 +253,6 @@ METHOD = "vehicle"
 
 def modes_of_drive(given: ChannelRecord | Path | str, question: ModesQuestion) -> Found:
     """The modes of the vehicle near the one of the question that was driven. BadInput as ``logger.api.modal.modes``."""
-    from logger.modal.driven_car import car_modes
-
     assert question.vehicle is not None
     model = model_of(question.vehicle)
     if model.effects:
@@ -334,8 +323,6 @@ class Channels(record_checks.ChannelRecord, Shown):
 
     def charts(self) -> Sequence[Chart]:
         """The channels over time."""
-        from logger.chart_data import Curves
-
         time_s = self.start_s + np.arange(len(self.samples)) / self.rate_hz
         return [Curves("Channels", "time [s]", "reading", tuple(
             line(name, time_s, one) for name, one in zip(self.names, self.samples.T, strict=True)))]

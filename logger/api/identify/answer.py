@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
 from types import MappingProxyType
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -27,26 +27,54 @@ from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput, CheckFailed
 from logger.identification.drive_model import DriveModel
 from logger.identification.identifiability import NotIdentifiable
 from logger.identification.noise_models import UNTESTED, Test, autocorrelation, cross_correlation
-from logger.identification.prediction_error_fit import Fit, least_share
-from logger.identification.shared_road_covariance import CommonRoughness, may_have_common
-from logger.identification.unknown_road.marginal_likelihood import GD_N0, NOISE, OFFSET
-from logger.identification.unknown_road.road_fit import RoadFit
-from logger.lab.readings_fit import ReadingsFit
+from logger.identification.prediction_error_fit import Fit, FitOptions, least_share
+from logger.identification.session import (
+    LEAST_SAMPLES,
+    UnusableRun,
+    check_records,
+    drive_model,
+    drives_of,
+    error_before,
+    fit_options,
+    obstacle_starts,
+    off_rate,
+)
+from logger.identification.shared_road_covariance import CommonRoughness, may_have_common, with_common_roughness
+from logger.identification.unknown_inputs import (
+    EACH,
+    Bump,
+    RoadInput,
+    RoadStep,
+    expanded,
+    free_input,
+    is_input,
+    run_and_name,
+)
+from logger.identification.unknown_road.marginal_likelihood import GD_N0, NOISE, OFFSET, Options
+from logger.identification.unknown_road.marginal_likelihood import Options as RoadOptions
+from logger.identification.unknown_road.road_fit import RoadFit, fit_roads
+from logger.lab.readings_fit import ReadingsFit, fit_to_readings
 from logger.left_out import LeftOut, left_out_json, left_out_paragraph
+from logger.profiles.track import Track
 from logger.runs import Run as Record
 from logger.runs import runs_left_out, unknown_past_s
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats import vehicle_file
 from logger.store.formats.drive_file import DRIVE, RUN
-from logger.vehicle.named_parameters import AXLES, BOTH, PRELOAD, Coordinates, Free
-from logger.vehicle.uncertain import UNKNOWN
-
-if TYPE_CHECKING:
-    from logger.identification.prediction_error_fit import FitOptions
-    from logger.identification.unknown_inputs import RoadInput
-    from logger.identification.unknown_road.marginal_likelihood import Options as RoadOptions
-    from logger.vehicle.uncertain import Known, NumberErrors
-    from logger.vehicle.vehicle import Vehicle
-
+from logger.store.formats.effect_file import check_on, shipped_effects
+from logger.vehicle.linear_car import AxleResponse
+from logger.vehicle.named_parameters import (
+    AXLES,
+    BOTH,
+    PRELOAD,
+    Coordinates,
+    Free,
+    free,
+    free_number,
+    free_parameter_named,
+)
+from logger.vehicle.uncertain import UNKNOWN, Known, NumberErrors
+from logger.vehicle.vehicle import Vehicle
 
 USUAL_WAVINESS = 2.0
 _FREE_WAVINESS = "road.waviness"
@@ -153,9 +181,6 @@ def _narrowed(question: IdentifyQuestion, drives: Sequence[Run]) -> IdentifyQues
 def _records(drives: Sequence[Run], question: IdentifyQuestion, vehicle: Vehicle) -> list[Record]:
     """Drives with their roads, or on a flat one. BadInput for one too short, or that cannot be what it says, and for
     rates that differ."""
-    from logger.identification.session import LEAST_SAMPLES, UnusableRun, check_records, off_rate
-    from logger.profiles.track import Track
-
     records = []
     for drive in drives:
         lasts_s, past_s = len(drive.time_s) / drive.rate_hz, unknown_past_s(drive.track)
@@ -188,11 +213,6 @@ def _records(drives: Sequence[Run], question: IdentifyQuestion, vehicle: Vehicle
 
 def _on_measured_roads(given: Model, records: list[Record], question: IdentifyQuestion) -> Identification:
     """The fit over roads that are known, but for a few numbers. BadInput and ``NotIdentifiable`` as ``identify``."""
-    from logger.identification.session import UnusableRun, error_before
-    from logger.identification.shared_road_covariance import with_common_roughness
-    from logger.lab.readings_fit import fit_to_readings
-    from logger.simulation.virtual_drive import SimulatedRuns
-
     word = word_of(question.vehicle, given)
     known = given.known if question.free is None else {}
     question = _with_unknown_numbers(given, word, records, question)
@@ -267,8 +287,6 @@ def _beside_beginnings(records: Sequence[Record]) -> tuple[LeftOut, ...]:
 def _check_effects(given: vehicle_file.CarModel, word: str, records: Sequence[Record],
                    question: IdentifyQuestion) -> None:
     """Raise BadInput for an effect that cannot be there on these roads, or one that is to be found and is not there."""
-    from logger.store.formats.effect_file import check_on, shipped_effects
-
     for one in given.effects:
         check_on(given.vehicle, one, all(record.two_tracks for record in records),
                  all(record.timed for record in records), all(record.pushed for record in records))
@@ -286,8 +304,6 @@ def _check_effects(given: vehicle_file.CarModel, word: str, records: Sequence[Re
 
 def _check_rigs(records: Sequence[Record], question: IdentifyQuestion) -> None:
     """Raise BadInput for what asks for a road, or a speed, of a rig."""
-    from logger.identification.unknown_inputs import is_input
-
     rig = next((record.name for record in records if record.timed), None)
     if rig is None:
         return
@@ -299,8 +315,6 @@ def _check_rigs(records: Sequence[Record], question: IdentifyQuestion) -> None:
 
 def _road(question: IdentifyQuestion) -> tuple[RoadInput, list[str]]:
     """What lies on the road, and the names of what has no start yet. BadInput for what is no bump or step."""
-    from logger.identification.unknown_inputs import Bump, RoadInput, RoadStep
-
     kinds, found = {"bump": Bump, "step": RoadStep}, dict[str, Any]()
     for name, numbers in (question.obstacles or {}).items():
         if name not in kinds:
@@ -318,8 +332,6 @@ def _road(question: IdentifyQuestion) -> tuple[RoadInput, list[str]]:
 
 def _drive_model(given: vehicle_file.CarModel, records: list[Record], road: RoadInput, unplaced: list[str],
                  question: IdentifyQuestion, known: Mapping[str, Known]) -> DriveModel:
-    from logger.identification.session import drive_model, obstacle_starts
-
     try:
         starts = obstacle_starts(given.vehicle, records, road, unplaced)
     except ValueError as error:
@@ -336,8 +348,6 @@ def _free(given: vehicle_file.CarModel, road: RoadInput, found: Mapping[str, flo
           question: IdentifyQuestion, known: Mapping[str, Known] = MappingProxyType({})) -> list[Free]:
     """The free numbers; where an obstacle's start was found and not named, it is one of them. BadInput for names,
     starts and bounds that do not fit."""
-    from logger.identification.unknown_inputs import EACH, expanded, is_input, run_and_name
-
     free = question.free or ()
     if cars := [name for name in free if name.startswith(f"{EACH}.") and not is_input(name)]:
         raise question.wrong("free", f" {cars[0]}: expected a number of the road after {EACH}., as all runs have one "
@@ -364,9 +374,6 @@ def _free_number(given: vehicle_file.CarModel, road: RoadInput, name: str, start
                  between: tuple[float, float] | None, known: Known | None) -> Free:
     """A number of the road, of an effect or of the car, with how well it was ``known``. ValueError for one that none of
     them has."""
-    from logger.identification.unknown_inputs import free_input, is_input
-    from logger.vehicle.named_parameters import free, free_number, free_parameter_named
-
     if is_input(name):
         return free_input(road, name, start, between)
     if (move := free_parameter_named(given.effects, name)) is not None:
@@ -376,8 +383,6 @@ def _free_number(given: vehicle_file.CarModel, road: RoadInput, name: str, start
 
 
 def _options(model: DriveModel, question: IdentifyQuestion) -> FitOptions:
-    from logger.identification.session import fit_options
-
     half_hz, low_pass_hz = model.records[0].rate_hz / 2, question.low_pass_hz
     if low_pass_hz is not None and not 0 < low_pass_hz < half_hz:
         raise question.wrong("low_pass_hz", f" {low_pass_hz:g}: expected above 0 and below {half_hz:g} Hz")
@@ -398,9 +403,6 @@ def _fitted(given: vehicle_file.CarModel, model: DriveModel, fit: Fit) -> vehicl
 
 def _errors(found: Sequence[str], covariance: Array) -> NumberErrors:
     """How far the numbers of car and effects may be off, without those of the road."""
-    from logger.identification.unknown_inputs import is_input
-    from logger.vehicle.uncertain import NumberErrors
-
     kept = [place for place, name in enumerate(found) if not is_input(name)]
     return NumberErrors.of_covariance([found[place] for place in kept], covariance[np.ix_(kept, kept)])
 
@@ -411,11 +413,6 @@ def _errors(found: Sequence[str], covariance: Array) -> NumberErrors:
 def _on_unmeasured_roads(given: Model, records: list[Record], question: IdentifyQuestion) -> Identification:
     """The fit over roads that were not measured: one for all runs, or one for each. BadInput and ``NotIdentifiable`` as
     ``identify``."""
-    from logger.identification.session import UnusableRun, drives_of
-    from logger.identification.unknown_inputs import RoadInput
-    from logger.identification.unknown_road.road_fit import fit_roads
-    from logger.vehicle.linear_car import AxleResponse
-
     options, question = _road_options(question)
     if given.effects:
         raise BadInput(f"{word_of(question.vehicle, given)}: expected a car without effects where the road was not "
@@ -445,8 +442,6 @@ def _on_unmeasured_roads(given: Model, records: list[Record], question: Identify
 
 def _road_fit_errors(fit: RoadFit) -> NumberErrors:
     """Of the car's numbers, whose covariance holds shares of sizes."""
-    from logger.vehicle.uncertain import NumberErrors
-
     kept = [fit.names.index(name) for name in fit.parameters]
     relative = fit.covariance[np.ix_(kept, kept)]
     errors = np.array([fit.standard_errors[name] for name in fit.parameters])
@@ -456,8 +451,6 @@ def _road_fit_errors(fit: RoadFit) -> NumberErrors:
 
 def _road_options(question: IdentifyQuestion) -> tuple[RoadOptions, IdentifyQuestion]:
     """How to fit, and the question without what is not the car's. BadInput for what needs a known road."""
-    from logger.identification.unknown_road.marginal_likelihood import Options
-
     unused = {"obstacles": question.obstacles, "low_pass_hz": question.low_pass_hz, "tries": question.tries,
               "noise": question.noise != "auto"}
     if given := [option for option, value in unused.items() if value]:

@@ -12,23 +12,49 @@ from itertools import chain
 from math import log
 from pathlib import Path
 from statistics import median
-from typing import TYPE_CHECKING
 
+import numpy as np
+
+from logger.api.vehicles import check_forces
+from logger.bounds import SPEED, time_hint
+from logger.dsp.channel_faults import goes_against, longest_still, share_at_ends
+from logger.dsp.repeated_samples import find_repeats, stretches_of
+from logger.dsp.whole_record import thinned
 from logger.errors import BadInput
+from logger.lab.another_car import AnotherCar, another_car, reading_gain
+from logger.lab.best_effect import error_with_best_effect
+from logger.lab.likelihood.lag import SLOWEST_MPS
+from logger.lab.likelihood.priors import Tolerance
+from logger.lab.likelihood.whittle import HIGHEST_OF_RATE, LOWEST_HZ
+from logger.lab.residuals.breakdown import ModelResiduals
+from logger.lab.residuals.road_coherence import coherence_with_road
+from logger.lab.road_match import (
+    RoadMatch,
+    below_bounce_band_hz,
+    better_placement,
+    bounce_band_hz,
+    match_below_bounce,
+    pool,
+    road_match,
+)
+from logger.lab.selection.evidence import FALSE_ALARM
+from logger.lab.selection.holdout import ROUNDING
+from logger.profiles.excitation import Excitation
+from logger.profiles.track import Track
+from logger.roads.iri import likely_unit
+from logger.runs import CLIPPED, NO_READING, READING, SKIP_S, Array, Bools, Run, Signal, begins_freely, unknown_past_s
+from logger.simulation.virtual_drive import SimulatedRuns, steps_hz
+from logger.store.formats.drive_file import DRIVE, RUN, Drive, DriveOnRoad
+from logger.store.formats.vehicle_file import CarModel
 from logger.units import FOOT_M, LBF_N, STANDARD_GRAVITY_MPS2
-
-if TYPE_CHECKING:
-    from logger.lab.another_car import AnotherCar
-    from logger.lab.likelihood.priors import Tolerance
-    from logger.lab.road_match import RoadMatch
-    from logger.runs import Array, Bools, Run, Signal
-    from logger.simulation.virtual_drive import SimulatedRuns
-    from logger.store.formats.drive_file import Drive, DriveOnRoad
-    from logger.store.formats.vehicle_file import CarModel
-    from logger.vehicle.compose import Car
-    from logger.vehicle.effect import Chosen, Effect
-    from logger.vehicle.vehicle import Vehicle
-
+from logger.vehicle.compose import Car, bounded, compose
+from logger.vehicle.effect import Chosen, Effect
+from logger.vehicle.effects.sensor_gain import EFFECT as SENSOR_GAIN
+from logger.vehicle.models import structure_of
+from logger.vehicle.modes import body_and_wheels_hz, undamped_frequencies_hz
+from logger.vehicle.simulate import resampled
+from logger.vehicle.stepping_loop import COMPILED
+from logger.vehicle.vehicle import Vehicle
 
 _MODEL_CHECKS_LEAST_MPS2 = 1e-4
 _NEAR = 0.3
@@ -62,8 +88,6 @@ def check_model(word: str, model: CarModel, runs: SimulatedRuns, warn: Callable[
     known      effects, by name: where one of them explains the runs as another car would, it may be this car
     tolerance  of the vehicle's numbers
     """
-    from logger.vehicle.compose import compose
-
     predictions = check_moves(word, model, runs)
     car = compose(model.vehicle, model.effects)
     followed = _followed(runs, predictions, car)
@@ -93,8 +117,6 @@ def check_moves(word: str, model: CarModel, runs: SimulatedRuns) -> list[Array]:
 def check_roads(word: str, model: CarModel, runs: SimulatedRuns, warn: Callable[[str], None], anyway: bool) -> None:
     """Raise BadInput where a run was driven over another road than that of its profile, as ``check_model``: all that
     can be asked where the vehicle's numbers may be far off."""
-    from logger.vehicle.compose import compose
-
     car = compose(model.vehicle, model.effects)
     followed = _followed(runs, predicted(word, model, runs, model.effects), car)
     _say(_other_roads(runs, followed, car), warn, anyway)
@@ -102,8 +124,6 @@ def check_roads(word: str, model: CarModel, runs: SimulatedRuns, warn: Callable[
 
 def predicted(word: str, model: CarModel, runs: SimulatedRuns, effects: Sequence[Chosen]) -> list[Array]:
     """What the car with these effects would have recorded. BadInput where it shakes itself to pieces."""
-    from logger.vehicle.compose import bounded, compose
-
     try:
         predictions = runs.predict(compose(model.vehicle, effects))
     except ValueError as error:
@@ -132,34 +152,23 @@ class _Followed:
 
     @cached_property
     def band_hz(self) -> tuple[float, float]:
-        from logger.lab.road_match import bounce_band_hz
-
         return bounce_band_hz(self.body_hz)
 
     @cached_property
     def around(self) -> list[RoadMatch]:
-        from logger.lab.road_match import road_match
-
         return [road_match(run, prediction, self.band_hz) for run, prediction in self.pairs]
 
     @cached_property
     def below(self) -> list[RoadMatch]:
-        from logger.lab.road_match import below_bounce_band_hz, road_match
-
         band_hz = below_bounce_band_hz(self.body_hz)
         return [road_match(run, prediction, band_hz) for run, prediction in self.pairs]
 
     @cached_property
     def below_at_hand(self) -> list[RoadMatch]:
-        from logger.lab.road_match import match_below_bounce
-
         return [match_below_bounce(run, prediction, self.body_hz) for run, prediction in self.pairs]
 
 
 def _followed(runs: SimulatedRuns, predictions: Sequence[Array], car: Car) -> _Followed:
-    from logger.vehicle.models import structure_of
-    from logger.vehicle.modes import body_and_wheels_hz
-
     body_hz, _ = body_and_wheels_hz(structure_of(car.vehicle))
     return _Followed([(run, run.main(one)) for run, one in zip(runs.runs, predictions, strict=True) if len(body_hz)],
                      body_hz)
@@ -184,8 +193,6 @@ def _other_units(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
     """Which runs on roads, or profiles, are in another unit, the nearest one. A factor that a sensor's gain may be is a
     unit only if it is one, and all runs agree, and below the bounce the median of the runs as well: there the body
     moves with the road whatever is missing, but one run holds few such waves."""
-    from logger.vehicle.effects.sensor_gain import EFFECT as SENSOR_GAIN
-
     if not followed.pairs or followed.pairs[0][0].timed:
         return
     clear = [(run, around.gain, below.gain) for (run, _), around, below in
@@ -203,9 +210,6 @@ def _other_units(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
 def _other_units_on_rig(model: CarModel, runs: SimulatedRuns, predictions: Sequence[Array], tolerance: Tolerance
                         ) -> Iterator[str]:
     """That what rigs did, or what drives them, was written in another unit."""
-    from logger.lab.another_car import reading_gain
-    from logger.profiles.excitation import Excitation
-
     run, main = runs.runs[0], runs.runs[0].facts.main
     track = run.track
     if not isinstance(track, Excitation) or track.is_still:
@@ -226,8 +230,6 @@ def _other_units_on_rig(model: CarModel, runs: SimulatedRuns, predictions: Seque
 
 def _other_roads(runs: SimulatedRuns, followed: _Followed, car: Car) -> Iterator[str]:
     """Which runs do not follow their road, and where they would fit."""
-    from logger.lab.road_match import pool
-
     strangers = [k for k, one in enumerate(followed.around) if one.is_refuted]
     if not strangers and followed.around and pool(followed.around).is_refuted:
         strangers = list(range(len(followed.around)))
@@ -242,13 +244,6 @@ def _other_roads(runs: SimulatedRuns, followed: _Followed, car: Car) -> Iterator
 
 def _is_coherent(run: Run, car: Car) -> bool:
     """Whether some linear rig follows what drives this one: its own may be off by more than the width of its mode."""
-    import numpy as np
-
-    from logger.lab.likelihood.whittle import LOWEST_HZ
-    from logger.lab.residuals.breakdown import ModelResiduals
-    from logger.lab.residuals.road_coherence import coherence_with_road
-    from logger.lab.selection.evidence import FALSE_ALARM
-
     still = ModelResiduals([run], car, [np.zeros((1 + len(run.signals)) * run.count)], [])
     _, chance = coherence_with_road(still).explained(LOWEST_HZ, still.top_hz)
     return chance < FALSE_ALARM  # of a run too short to tell it is NaN
@@ -257,9 +252,6 @@ def _is_coherent(run: Run, car: Car) -> bool:
 def _another_car(word: str, model: CarModel, runs: SimulatedRuns, predictions: Sequence[Array],
                  known: Mapping[str, Effect], numbers: float) -> Iterator[str]:
     """That the runs are of another car, which explains them as no effect does, and how it differs."""
-    from logger.lab.another_car import another_car
-    from logger.vehicle.stepping_loop import COMPILED
-
     mains = [run.main(one) for run, one in zip(runs.runs, predictions, strict=True)]
     found = another_car(runs.runs, model.vehicle, model.effects, mains, numbers)
     if found is not None and not _explained_by_an_effect(found, model, known, numbers):
@@ -274,19 +266,12 @@ def _another_car(word: str, model: CarModel, runs: SimulatedRuns, predictions: S
 
 def _explained_by_an_effect(found: AnotherCar, model: CarModel, known: Mapping[str, Effect], numbers: float) -> bool:
     """Whether an effect, in the model's car, explains as much as another car does."""
-    from logger.lab.best_effect import error_with_best_effect
-    from logger.lab.selection.holdout import ROUNDING
-
     error = error_with_best_effect(found.runs, model.vehicle, model.effects, known, numbers)
     return error <= (1 + ROUNDING) * found.found_error  # both may have come down to the noise
 
 
 def _advice(run: Run, car: Car, band_hz: tuple[float, float]) -> str:
     """Where a run that does not follow its road would fit."""
-    from logger.lab.road_match import better_placement
-    from logger.profiles.track import Track
-    from logger.simulation.virtual_drive import SimulatedRuns
-
     track = run.track
     if not isinstance(track, Track):
         return "is it another run's excitation, or another clock's?"
@@ -327,11 +312,6 @@ def checked_runs(drives: Sequence[DriveOnRoad], thin: bool = True, vehicle: Vehi
 
     Raises BadInput for one that is not what ``check_record`` asks for, or stands nowhere on its own profile.
     """
-    from logger.api.vehicles import check_forces
-    from logger.profiles.track import Track
-    from logger.simulation.virtual_drive import SimulatedRuns, steps_hz
-    from logger.store.formats.drive_file import DRIVE, RUN
-
     for number, drive in enumerate(drives):
         file = drive.path / DRIVE if drive.path.is_dir() else drive.path
         if isinstance(drive.track, Track):
@@ -361,10 +341,7 @@ def of_rates(run: Run) -> Run:
     """The run of an axis with the rates of its places in their stead: a small force, or a start that is not known,
     moves a place without bound, and the rate by no more than the damper allows. Rates are those of cubic splines, right
     to a part in 10,000 up to a thirtieth of the sample rate, and have a zero."""
-    import numpy as np
     from scipy.interpolate import CubicSpline
-
-    from logger.runs import NO_READING
 
     def is_place(signal: Signal) -> bool:
         return signal.measures in ("displacement", "travel")
@@ -391,11 +368,6 @@ def of_rates(run: Run) -> Run:
 
 def check_distances(drive: Drive, file: Path) -> None:
     """Raise BadInput for distances that are none: they fall, leap, or have nothing to do with the speed."""
-    import numpy as np
-
-    from logger.bounds import SPEED
-    from logger.roads.iri import likely_unit
-
     distance_m = drive.distance_m
     for wrong, words in (
         (np.diff(distance_m) > SPEED.largest / drive.rate_hz + _BACK_M, "that grow steadily"),
@@ -414,9 +386,6 @@ def check_distances(drive: Drive, file: Path) -> None:
 def driven_stretches(drive: DriveOnRoad) -> list[Run]:
     """The parts of a drive in which the car moved, or it is known what drove the rig, and there were readings
     (``driven_parts``), each a run. A part says in its name which seconds it is of. BadInput as ``driven_parts``."""
-    from logger.profiles.excitation import Excitation
-    from logger.runs import Run, unknown_past_s
-
     driven = None
     if isinstance(drive.track, Excitation):
         near_s, time_s = 0.5 / drive.rate_hz, drive.time_s - drive.time_s[0]
@@ -439,10 +408,6 @@ def driven_stretches(drive: DriveOnRoad) -> list[Run]:
 def least_s(drive: Drive, vehicle: Vehicle | None = None) -> float:
     """How long a drive, or a test of a part, has to be; of a rig that nothing drives three periods of the vehicle's
     slowest vibration, or what there is where that is not known [s]."""
-    from logger.runs import begins_freely
-    from logger.vehicle.models import structure_of
-    from logger.vehicle.modes import undamped_frequencies_hz
-
     track = getattr(drive, "track", None)
     if begins_freely(track):
         slowest_hz = 0.0 if vehicle is None else float(undamped_frequencies_hz(structure_of(vehicle))[0])
@@ -452,8 +417,6 @@ def least_s(drive: Drive, vehicle: Vehicle | None = None) -> float:
 
 def check_decay(drive: Drive, file: Path) -> None:
     """Raise BadInput for a record that does not die down, of a run that nothing drives."""
-    from logger.runs import begins_freely
-
     if begins_freely(getattr(drive, "track", None)):
         half = len(drive.accel_z_mps2) // 2
         first, last = (float(part.std()) for part in (drive.accel_z_mps2[:half], drive.accel_z_mps2[half:]))
@@ -469,11 +432,6 @@ _ORDERS = {"displacement": 0, "travel": 0, "velocity": 1, "acceleration": 2}
 def check_channels(drive: Drive, file: Path, vehicle: Vehicle) -> None:
     """Raise BadInput for a channel of a rig that was at its end or out for a time, which no column ``usable`` says, and
     for a force of the wrong sign."""
-    import numpy as np
-
-    from logger.dsp.channel_faults import goes_against, longest_still, share_at_ends
-    from logger.profiles.excitation import Excitation
-
     track, main = getattr(drive, "track", None), drive.facts.main
     if not isinstance(track, Excitation):
         return
@@ -512,12 +470,6 @@ def driven_parts(drive: Drive, on_rig: Bools | None = None) -> list[slice]:
 
     Raises BadInput where no part has readings for ``least_s``.
     """
-    import numpy as np
-
-    from logger.dsp.repeated_samples import stretches_of
-    from logger.lab.likelihood.lag import SLOWEST_MPS
-    from logger.runs import NO_READING, SKIP_S
-
     driven = drive.speed_mps >= SLOWEST_MPS if on_rig is None else on_rig
     read = driven if drive.usable is None else driven & (drive.usable != NO_READING)
     kept = read.copy()
@@ -535,8 +487,6 @@ def driven_parts(drive: Drive, on_rig: Bools | None = None) -> list[slice]:
 
 def _more(drive: Drive, part: slice) -> Array:
     """The other signals (s, n) of a part of a drive, without their means."""
-    import numpy as np
-
     columns = [drive.more[one.name][part] for one in drive.facts.signals]
     return np.stack([one - one.mean() for one in columns]) if columns else np.empty((0, 0))
 
@@ -548,11 +498,6 @@ def thinned_runs(runs: Sequence[Run], vehicle: Vehicle | None = None) -> list[Ru
     Little of a car's motion lies where the recorder's filter begins; what jerks a rig of little mass is there as well,
     so that its record goes through the filter that its model goes through.
     """
-    import numpy as np
-
-    from logger.dsp.whole_record import thinned
-    from logger.vehicle.simulate import resampled
-
     factor = int(runs[0].rate_hz / _needed_hz(vehicle) + _NEARLY)
     if factor < 2:
         return list(runs)
@@ -570,10 +515,6 @@ def thinned_runs(runs: Sequence[Run], vehicle: Vehicle | None = None) -> list[Ru
 def _thinned_marks(usable: Array | None, factor: int) -> Array | None:
     """What every ``factor``-th sample is (n,), with those within reach of it: none where one has no reading, else
     clipped where one is."""
-    import numpy as np
-
-    from logger.runs import CLIPPED, NO_READING, READING
-
     if usable is None:
         return None
 
@@ -587,10 +528,6 @@ def _thinned_marks(usable: Array | None, factor: int) -> Array | None:
 def _needed_hz(vehicle: Vehicle | None) -> float:
     """Samples a second that the lab needs: what it looks at reaches an octave above the vehicle's quickest vibration.
     """
-    from logger.lab.likelihood.whittle import HIGHEST_OF_RATE
-    from logger.vehicle.models import structure_of
-    from logger.vehicle.modes import undamped_frequencies_hz
-
     if vehicle is None:
         return _RATE_HZ
     return max(_RATE_HZ, 2 * float(undamped_frequencies_hz(structure_of(vehicle))[-1]) / HIGHEST_OF_RATE)
@@ -599,10 +536,6 @@ def _needed_hz(vehicle: Vehicle | None) -> float:
 def _least_hz(drive: Drive, vehicle: Vehicle | None) -> tuple[float, str]:
     """The fewest samples a second that show what the lab looks at, and what that is: on a rig the vehicle's slowest
     vibration, and on a road the wheels' hop."""
-    from logger.lab.likelihood.whittle import HIGHEST_OF_RATE
-    from logger.vehicle.models import structure_of
-    from logger.vehicle.modes import undamped_frequencies_hz
-
     track = getattr(drive, "track", None)
     if vehicle is None or track is None or not track.timed:
         return _LEAST_RATE_HZ, "the wheels hop"
@@ -612,8 +545,6 @@ def _least_hz(drive: Drive, vehicle: Vehicle | None) -> tuple[float, str]:
 
 def check_rate(drive: Drive, file: Path, vehicle: Vehicle | None) -> None:
     """Raise BadInput for a drive of fewer samples a second than what is looked at needs."""
-    from logger.bounds import time_hint
-
     least_hz, seen = _least_hz(drive, vehicle)
     if drive.rate_hz < (1 - _CLOCK) * least_hz:
         raise BadInput(f"{file}: expected {least_hz:.4g} samples a second or more, to see {seen}, found "
@@ -623,11 +554,6 @@ def check_rate(drive: Drive, file: Path, vehicle: Vehicle | None) -> None:
 def check_record(drive: Drive, file: Path, others: Sequence[Drive], vehicle: Vehicle | None = None) -> None:
     """Raise BadInput for a drive of fewer samples a second than what is looked at needs, that is too short, has
     another rate than the others, recorded nothing, or repeats samples."""
-    import numpy as np
-
-    from logger.dsp.repeated_samples import find_repeats
-    from logger.runs import READING, begins_freely, unknown_past_s
-
     track = getattr(drive, "track", None)
     past_s, shortest_s = unknown_past_s(track), least_s(drive, vehicle)
     check_rate(drive, file, vehicle)
