@@ -267,10 +267,9 @@ def _friction_of_held(laws: CornerLaws, rate_mps: Array, rise_mps2: Array, step_
         size = np.abs(rate)
         return size + transition * np.log1p(np.exp(-2 * size / transition)) if transition > 0 else size
 
-    at_once = np.tanh(rate_mps / transition) if transition > 0 else np.sign(rate_mps)
     over = np.abs(way) > _NO_RISE_MPS
     mean = (integral(rate_mps + way) - integral(rate_mps - way)) / np.where(over, 2 * way, 1.0)
-    return np.asarray(laws.dry_friction_n * np.where(over, mean, at_once))
+    return np.where(over, laws.dry_friction_n * mean, laws.friction_n(rate_mps))
 
 
 def _preload(force_n: float, travel_m: Array) -> Array:

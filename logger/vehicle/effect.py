@@ -36,6 +36,8 @@ from logger.vehicle.laws import CornerLaws
 from logger.vehicle.structure import Structure
 from logger.vehicle.vehicle import OWN_NAMES, Vehicle
 
+Values = SimpleNamespace
+"""Values of an effect's parameters, by attribute."""
 _AT_BOUND = 1e-3
 ON_A_RIG = "it needs a road and a speed, and the run is driven by time"
 """Why some effects cannot be tried on a rig."""
@@ -174,7 +176,7 @@ def resonances_hz(low_hz: float, high_hz: float, damping_ratio: float) -> tuple[
 class Effect(ABC):
     """What every effect offers.
 
-    name         as the file's, and as users write it
+    name         as users write it; of those that come with ridelog the file's
     title        in a few words
     parameters   its numbers, maybe none
     source       where the law is from
@@ -218,6 +220,11 @@ class Effect(ABC):
     also_by: tuple[str, ...] = ()
     stage: int = 0
     variants: Mapping[str, Effect] = MappingProxyType({})
+
+    def __init_subclass__(cls) -> None:
+        folder, _, file = cls.__module__.rpartition(".")
+        if folder == "logger.vehicle.effects" and "name" not in vars(cls):
+            cls.name = file
 
     @property
     def usual(self) -> dict[str, float]:
@@ -285,7 +292,7 @@ class DriveEffect(Effect):
     needs_road = True
 
     @abstractmethod
-    def driven(self, p: SimpleNamespace, distance_m: Array) -> Array:
+    def driven(self, p: Values, distance_m: Array) -> Array:
         """Where the front tires truly were (n,) when these distances were recorded [m]."""
 
 
@@ -295,7 +302,7 @@ class RoadEffect(Effect):
     needs_road = True
 
     @abstractmethod
-    def road(self, p: SimpleNamespace, spacing_m: float, elevation_m: Array) -> Array:
+    def road(self, p: Values, spacing_m: float, elevation_m: Array) -> Array:
         """Elevations of the road itself (n,) along one track, of those in its profile (n,) at this spacing [m]."""
 
 
@@ -303,7 +310,7 @@ class ActuatorEffect(Effect):
     """A force that drives a rig, where another one acts than the one that was recorded."""
 
     @abstractmethod
-    def force(self, p: SimpleNamespace, rate_hz: float, force_n: Array) -> Array:
+    def force(self, p: Values, rate_hz: float, force_n: Array) -> Array:
         """The force that acts (n,), of the one that was recorded (n,) at this rate [N]."""
 
 
@@ -311,7 +318,7 @@ class VehicleEffect(Effect):
     """The numbers of the car."""
 
     @abstractmethod
-    def vehicle(self, p: SimpleNamespace, vehicle: Vehicle) -> Vehicle:
+    def vehicle(self, p: Values, vehicle: Vehicle) -> Vehicle:
         """The car as it is."""
 
 
@@ -321,7 +328,7 @@ class BodyEffect(Effect):
     needs_body = True
 
     @abstractmethod
-    def structure(self, p: SimpleNamespace, structure: Structure) -> Structure:
+    def structure(self, p: Values, structure: Structure) -> Structure:
         """The structure with it."""
 
 
@@ -330,10 +337,10 @@ class ForceEffect(Effect):
     or has ``AXLE`` among its parameters."""
 
     @abstractmethod
-    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+    def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
         """The laws of a corner with it."""
 
-    def laws_at_its_axle(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+    def laws_at_its_axle(self, p: Values, laws: CornerLaws) -> CornerLaws:
         """The same, where it may sit in one axle alone."""
         return self.laws(p, laws) if getattr(p, AXLE.name, 0) in (0, 1 + laws.rear) else laws
 
@@ -342,7 +349,7 @@ class SensorEffect(Effect):
     """Between the body's motion and the record; linear."""
 
     @abstractmethod
-    def factor(self, p: SimpleNamespace, s: Complex) -> Complex:
+    def factor(self, p: Values, s: Complex) -> Complex:
         """What an acceleration exp(s t) is multiplied by, s (...) [1/s]."""
 
 
@@ -369,7 +376,7 @@ class RecordEffect(Effect):
     samples, behind the recorder's filter."""
 
     @abstractmethod
-    def record(self, p: SimpleNamespace, recording: Recording) -> Array:
+    def record(self, p: Values, recording: Recording) -> Array:
         """What is recorded (n,) [m/s2]."""
 
 
@@ -420,9 +427,9 @@ class Chosen:
                    for one in self.effect.parameters)
 
     @property
-    def p(self) -> SimpleNamespace:
+    def p(self) -> Values:
         """The values by attribute."""
-        return SimpleNamespace(**self.values)
+        return Values(**self.values)
 
 
 def chosen(effect: Effect, values: Mapping[str, float], **more: Any) -> Chosen:

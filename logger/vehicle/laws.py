@@ -126,6 +126,23 @@ class CornerLaws:
         """Whether there is dry friction in it."""
         return self.dry_friction_n > 0 or self.wheel_friction_n > 0 or self.body_friction_n > 0
 
+    def friction_n(self, rate_mps: Array) -> Array:
+        """Dry friction (n,) of the suspension at these rates (n,) [N]."""
+        if self.friction_transition_mps > 0:
+            return np.asarray(self.dry_friction_n * np.tanh(rate_mps / self.friction_transition_mps))
+        return np.asarray(self.dry_friction_n * np.sign(rate_mps))
+
+    def by_rate_n(self, rate_mps: Array) -> Array:
+        """Force (n,) of damper and friction at these rates (n,), at no travel [N]."""
+        forces = (one(np.zeros_like(rate_mps), rate_mps) for one in self.others)
+        return np.asarray(sum(forces, self.damper(rate_mps) + self.friction_n(rate_mps)))
+
+    def by_travel_n(self, travel_m: Array) -> Array:
+        """Force (n,) beyond the linear spring at these travels (n,), at no rate [N]."""
+        still = np.zeros_like(travel_m)
+        return np.asarray(sum((one(travel_m) for one in self.springs), still)
+                          + sum((one(travel_m, still) for one in self.others), still))
+
     def with_spring(self, law: Law) -> CornerLaws:
         """With one more force by travel."""
         return replace(self, springs=(*self.springs, law))

@@ -13,7 +13,6 @@ from contextlib import AbstractContextManager
 from copy import copy
 from dataclasses import fields, is_dataclass, replace
 from numbers import Real
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -34,6 +33,7 @@ from logger.vehicle.effect import (
     Scale,
     SensorEffect,
     Sought,
+    Values,
     VehicleEffect,
 )
 from logger.vehicle.laws import MOST_MEMORY, Between, CornerLaws, MotionLaw, Seen, linear
@@ -57,7 +57,7 @@ def watched(effect: Effect, blame: Blame) -> Effect:
     name = next(name for kind, name in KINDS.items() if isinstance(effect, kind))
     found, own = copy(effect), getattr(effect, name)
 
-    def asked(p: SimpleNamespace, *given: Any) -> Any:
+    def asked(p: Values, *given: Any) -> Any:
         with blame(), np.errstate(all="ignore"):
             return _looked_at(name, own(p, *map(_copied, given)), given[-1], blame)
 
@@ -299,7 +299,7 @@ def _look_through(one: Parameter) -> None:
                              f"found {value}")
 
 
-def try_out(effect: Effect, p: SimpleNamespace, vehicle: Vehicle) -> None:
+def try_out(effect: Effect, p: Values, vehicle: Vehicle) -> None:
     """Ask a watched effect once on a car, as far as a simulation does."""
     name = next(name for kind, name in KINDS.items() if isinstance(effect, kind))
     time_s = np.arange(0.0, 60.0, 0.1)

@@ -17,7 +17,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from re import findall
 from textwrap import fill, indent
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -26,7 +25,7 @@ from logger.arrays import Array
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.runs import Run
 from logger.vehicle.compose import Response
-from logger.vehicle.effect import Chosen, Effect, Parameter
+from logger.vehicle.effect import Chosen, Effect, Parameter, Values
 from logger.vehicle.vehicle import Vehicle
 
 LEARNED = "learned_"
@@ -129,13 +128,12 @@ class Draft:
 
         assert isinstance(self.effect, ForceEffect)
         before = linear(damping_n_s_per_m, self.axle == "rear")
-        laws, still = self.effect.laws(SimpleNamespace(**values), before), np.zeros_like(at)
+        laws = self.effect.laws(Values(**values), before)
         if self.at == "rate":
-            found = laws.damper(at) - before.damper(at) + sum(one(still, at) for one in laws.others)
-            return np.asarray(found + laws.dry_friction_n * np.sign(at))
-        some = laws.tires if self.at == "deflection" else laws.springs
-        others = sum(one(at, still) for one in laws.others) if self.at == "travel" else 0.0
-        return np.asarray(sum((one(at) for one in some), still) + others)
+            return laws.by_rate_n(at) - before.by_rate_n(at)
+        if self.at == "deflection":
+            return np.asarray(sum((one(at) for one in laws.tires), np.zeros_like(at)))
+        return laws.by_travel_n(at)
 
 
 def _at(one: Parameter, value: float) -> Parameter:
@@ -219,7 +217,7 @@ class LawContext:
 class Family(ABC):
     """A family of laws.
 
-    name               as the file's
+    name               of those that come with ridelog the file's
     title              in a few words
     related_effects    names of effects of the list that one of its laws may nearly be
     kind, source, signature    of its laws, as ``Draft`` has them, unless these say something else
@@ -238,6 +236,11 @@ class Family(ABC):
     shown_by: str
     straight_at: float | None = None
     stands_out: bool = False
+
+    def __init_subclass__(cls) -> None:
+        folder, _, file = cls.__module__.rpartition(".")
+        if folder == "logger.lab.laws.families" and "name" not in vars(cls):
+            cls.name = file
 
     @abstractmethod
     def drafts(self, context: LawContext) -> list[Draft]:

@@ -60,7 +60,7 @@ def fitted_car(posterior: Posterior, stood: State, found: State) -> FittedCar:
             reach = float(np.quantile(size[:, wheel], CURVE_REACH))
             at = np.linspace(-reach, reach, CURVE_POINTS)
             # An effect such as roll turns two wheels into four: the same axle, another number.
-            old, new = (_force_n(car, _wheels(car)[axle], motion, at) for car in (before, after))
+            old, new = (_force_n(car.laws[_wheels(car)[axle]], motion, at) for car in (before, after))
             curves.append(ForceCurve(axle, motion, at, old, new))
     return FittedCar(moved, tuple(curves))
 
@@ -71,20 +71,6 @@ def _wheels(car: Car) -> dict[str, int]:
     return {"front": 0} if rear is None else {"front": 0, "rear": rear}
 
 
-def _force_n(car: Car, number: int, motion: str, at: Array) -> Array:
+def _force_n(laws: CornerLaws, motion: str, at: Array) -> Array:
     """Force of a wheel's suspension (n,) [N]."""
-    laws = car.laws[number]
-    axle = car.vehicle.rear if laws.rear and car.vehicle.rear is not None else car.vehicle.front
-    still = np.zeros_like(at)
-    if motion == RATE:
-        force = laws.damper(at) + _friction_n(laws, at)
-        return np.asarray(force + sum((one(still, at) for one in laws.others), still))
-    force = axle.suspension_stiffness_n_per_m * at + sum((one(at) for one in laws.springs), still)
-    return np.asarray(force + sum((one(at, still) for one in laws.others), still))
-
-
-def _friction_n(laws: CornerLaws, rate_mps: Array) -> Array:
-    """Dry friction (n,) [N]."""
-    if laws.friction_transition_mps > 0:
-        return np.asarray(laws.dry_friction_n * np.tanh(rate_mps / laws.friction_transition_mps))
-    return np.asarray(laws.dry_friction_n * np.sign(rate_mps))
+    return laws.by_rate_n(at) if motion == RATE else laws.stiffness_n_per_m * at + laws.by_travel_n(at)

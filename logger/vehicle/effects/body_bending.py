@@ -9,11 +9,10 @@ ends move by p e, so that the forces work on what they move.
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 
-from logger.vehicle.effect import BodyEffect, Parameter, Scale, resonances_hz
+from logger.vehicle.effect import BodyEffect, Parameter, Scale, Values, resonances_hz
 from logger.vehicle.structure import Structure, hung
 
 # What the ends of the suspensions move by, over the sensor, where the axles are near the nodes: nothing to speak of.
@@ -21,7 +20,6 @@ _AT_A_NODE = 1e-3
 
 
 class BodyBending(BodyEffect):
-    name = "body_bending"
     title = "first bending mode of the body"
     parameters = (
         Parameter("frequency_hz", 22.0, 5.0, 60.0, None, Scale.LOG, resonances_hz(11.0, 42.0, 0.05), "of the mode"),
@@ -39,7 +37,7 @@ class BodyBending(BodyEffect):
 
     stage = 5  # what hangs on the body hangs on the rigid one
 
-    def structure(self, p: SimpleNamespace, structure: Structure) -> Structure:
+    def structure(self, p: Values, structure: Structure) -> Structure:
         omega, mass = 2 * np.pi * p.frequency_hz, structure.mass[0, 0]
         share = 1.0 if p.ends_move else _AT_A_NODE
         ends = np.full(len(structure.wheels), p.participation * share)

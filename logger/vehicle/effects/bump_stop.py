@@ -5,16 +5,13 @@ Beyond a clearance c of compression from rest it adds the force k (compression -
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 
-from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale
+from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Values
 from logger.vehicle.laws import CornerLaws
 
 
 class BumpStop(ForceEffect):
-    name = "bump_stop"
     title = "a stiff stop at the end of the suspension's travel in compression"
     parameters = (
         Parameter("clearance_m", 0.04, 0.001, 0.3, None, Scale.LINEAR, (0.01, 0.02, 0.03, 0.045, 0.06),
@@ -26,7 +23,7 @@ class BumpStop(ForceEffect):
     signature = "short hard blows upward where the suspension is most compressed; elsewhere the model fits"
     shown_by = "drive over a large bump fast enough for the suspension to bottom out"
 
-    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+    def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
         return laws.with_spring(lambda travel_m: p.stop_stiffness_n_per_m * np.minimum(travel_m + p.clearance_m, 0.0))
 
 

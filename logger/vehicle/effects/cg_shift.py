@@ -7,14 +7,12 @@ beyond an axle is applied as well, so that a fit may pass there; ``check_on`` re
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
-from logger.vehicle.effect import Parameter, Scale, VehicleEffect
+from logger.vehicle.effect import Parameter, Scale, Values, VehicleEffect
 from logger.vehicle.vehicle import Vehicle
 
 
 class CgShift(VehicleEffect):
-    name = "cg_shift"
     title = "the centre of gravity is ahead of the model's, or behind it"
     parameters = (
         Parameter("shift_m", 0.15, -1.0, 1.0, 0.0, Scale.LINEAR, (-0.15, -0.03, 0.03, 0.15),
@@ -28,7 +26,7 @@ class CgShift(VehicleEffect):
     def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:
         return "a quarter car has one axle" if vehicle.rear is None else None
 
-    def vehicle(self, p: SimpleNamespace, vehicle: Vehicle) -> Vehicle:
+    def vehicle(self, p: Values, vehicle: Vehicle) -> Vehicle:
         front, rear = vehicle.front, vehicle.rear
         assert rear is not None
         return replace(

@@ -6,15 +6,12 @@ that is not linear works around another place then, and is stiffer one way than 
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
-from logger.vehicle.effect import ForceEffect, Parameter, Scale, Sought
+from logger.vehicle.effect import ForceEffect, Parameter, Scale, Sought, Values
 from logger.vehicle.laws import CornerLaws
 from logger.vehicle.vehicle import Vehicle
 
 
 class ConstantForce(ForceEffect):
-    name = "constant_force"
     title = "a constant force, such as a weight or the zero of the force's sensor"
     parameters = (
         Parameter("push_n", 20.0, -1e4, 1e4, 0.0, Scale.LINEAR, (-20.0, 20.0), "up positive"),
@@ -28,7 +25,7 @@ class ConstantForce(ForceEffect):
     def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:
         return None if vehicle.model == "single_mass" else "springs take it up at rest"
 
-    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+    def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
         return laws if p.push_n == 0 else laws.with_spring(lambda travel_m: 0.0 * travel_m - p.push_n)
 
 

@@ -6,17 +6,15 @@ With r the ratio of the two slopes and their mean kept, rebound has 2 r / (1 + r
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 
 from logger.arrays import Array
-from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale
+from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Values
 from logger.vehicle.laws import CornerLaws
 
 
 class DamperAsymmetry(ForceEffect):
-    name = "damper_asymmetry"
     title = "rebound damping differs from bump damping"
     parameters = (
         Parameter("rebound_to_bump_ratio", 1.5, 0.1, 10.0, 1.0, Scale.LOG, (0.67, 1.5, 3.0),
@@ -27,7 +25,7 @@ class DamperAsymmetry(ForceEffect):
     signature = "the body sits lower while it shakes; peaks up and down differ, and the record has twice each frequency"
     shown_by = "drive single bumps and a rough road, so that the suspension moves fast both ways"
 
-    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+    def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
         rebound = 2 * p.rebound_to_bump_ratio / (1 + p.rebound_to_bump_ratio)
         damper = laws.damper
 

@@ -6,17 +6,15 @@ Up to the knee the force is that of the damper without it; beyond, what it would
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 
 from logger.arrays import Array
-from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale
+from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Values
 from logger.vehicle.laws import CornerLaws
 
 
 class DamperBlowOff(ForceEffect):
-    name = "damper_blow_off"
     title = "digressive dampers: beyond a knee velocity the slope falls"
     parameters = (
         Parameter("knee_velocity_m_per_s", 0.15, 0.005, 2.0, None, Scale.LOG, (0.05, 0.12, 0.25, 0.5),
@@ -29,7 +27,7 @@ class DamperBlowOff(ForceEffect):
     signature = "the damping falls as the road gets rougher: strong motions ring longer than in the model"
     shown_by = "drive the same road slowly and fast, or a smooth and a rough one: the damping must differ"
 
-    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+    def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
         damper, knee = laws.damper, p.knee_velocity_m_per_s
 
         def digressive(rate_mps: Array) -> Array:

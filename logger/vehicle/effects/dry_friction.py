@@ -7,14 +7,12 @@ rubber gives way first: then the force is F tanh(x' / v), with v the rate at whi
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
-from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale
+from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Values
 from logger.vehicle.laws import CornerLaws
 
 
 class DryFriction(ForceEffect):
-    name = "dry_friction"
     title = "Coulomb friction in each suspension"
     parameters = (
         Parameter("friction_force_n", 60.0, 0.0, 2000.0, 0.0, Scale.LINEAR, (20.0, 60.0, 180.0),
@@ -28,7 +26,7 @@ class DryFriction(ForceEffect):
     signature = "on smooth stretches the springs lock and the body rides on its tires; rough ones change little"
     shown_by = "drive a smooth road slowly, so that the suspension hardly moves"
 
-    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+    def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
         if p.friction_force_n == 0:
             return laws
         return replace(laws, dry_friction_n=laws.dry_friction_n + p.friction_force_n,

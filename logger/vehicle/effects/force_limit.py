@@ -6,16 +6,13 @@ more than L.
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 
 from logger.arrays import Array
-from logger.vehicle.effect import ActuatorEffect, Parameter, Scale, Sought
+from logger.vehicle.effect import ActuatorEffect, Parameter, Scale, Sought, Values
 
 
 class ForceLimit(ActuatorEffect):
-    name = "force_limit"
     title = "a shaker, coil or motor that saturates"
     parameters = (
         Parameter("limit_n", 500.0, 1.0, 1e7, float("inf"), Scale.RECIPROCAL, (100.0, 500.0, 2500.0),
@@ -26,7 +23,7 @@ class ForceLimit(ActuatorEffect):
     shown_by = "push it weakly and strongly with the same motion"
     sought = Sought.ON_RIGS
 
-    def force(self, p: SimpleNamespace, rate_hz: float, force_n: Array) -> Array:
+    def force(self, p: Values, rate_hz: float, force_n: Array) -> Array:
         return np.asarray(p.limit_n * np.tanh(force_n / p.limit_n))
 
 

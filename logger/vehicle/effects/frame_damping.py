@@ -9,14 +9,12 @@ A single mass has one guide, which stands on the ground while its base moves.
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
-from logger.vehicle.effect import BodyEffect, Parameter, Scale, Sought
+from logger.vehicle.effect import BodyEffect, Parameter, Scale, Sought, Values
 from logger.vehicle.structure import BASE_INPUTS, Structure
 
 
 class FrameDamping(BodyEffect):
-    name = "frame_damping"
     title = "on a rig: viscous drag of wheel and body against their guides"
     parameters: tuple[Parameter, ...] = (
         Parameter("wheel_damping_n_s_per_m", 30.0, 0.0, 1e4, 0.0, Scale.LINEAR, (10.0, 60.0),
@@ -31,7 +29,7 @@ class FrameDamping(BodyEffect):
     sought = Sought.ON_RIGS
     also_by: tuple[str, ...] = ("body_damping_n_s_per_m",)
 
-    def structure(self, p: SimpleNamespace, structure: Structure) -> Structure:
+    def structure(self, p: Values, structure: Structure) -> Structure:
         wheels, ends = structure.wheels, structure.travel + structure.wheels
         drag = p.wheel_damping_n_s_per_m * wheels.T @ wheels + p.body_damping_n_s_per_m * ends.T @ ends
         return replace(structure, damping=structure.damping + drag)
@@ -45,7 +43,7 @@ class _OfMass(FrameDamping):
     shown_by = "shake the base slowly and quickly: a drag against the ground holds the mass back even below its bounce"
     also_by = ()
 
-    def structure(self, p: SimpleNamespace, structure: Structure) -> Structure:
+    def structure(self, p: Values, structure: Structure) -> Structure:
         road = structure.road.copy()  # its place is counted from the base, which moves against the guide
         road[0, BASE_INPUTS.index("velocity")] -= p.body_damping_n_s_per_m
         return replace(structure, damping=structure.damping + p.body_damping_n_s_per_m, road=road)

@@ -13,14 +13,12 @@ A single mass has one guide, which stands on the ground while its base moves.
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
-from logger.vehicle.effect import ForceEffect, Parameter, Scale, Sought
+from logger.vehicle.effect import ForceEffect, Parameter, Scale, Sought, Values
 from logger.vehicle.laws import CornerLaws
 
 
 class FrameFriction(ForceEffect):
-    name = "frame_friction"
     title = "on a rig: Coulomb friction of wheel and body against their guides"
     parameters: tuple[Parameter, ...] = (
         Parameter("friction_force_n", 20.0, 0.0, 2000.0, 0.0, Scale.LINEAR, (5.0, 20.0, 80.0),
@@ -38,7 +36,7 @@ class FrameFriction(ForceEffect):
     sought = Sought.ON_RIGS
     also_by: tuple[str, ...] = ("body_friction_force_n",)
 
-    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+    def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
         if p.friction_force_n == 0 and p.body_friction_force_n == 0:
             return laws
         return replace(laws, wheel_friction_n=laws.wheel_friction_n + p.friction_force_n,
@@ -53,8 +51,8 @@ class _OfMass(FrameFriction):
     shown_by = "shake the rig with small amplitudes, slowly, so that the mass hardly moves"
     also_by = ()
 
-    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
-        return super().laws(SimpleNamespace(friction_force_n=0.0, body_friction_force_n=p.friction_force_n,
+    def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
+        return super().laws(Values(friction_force_n=0.0, body_friction_force_n=p.friction_force_n,
                                             transition_velocity_m_per_s=p.transition_velocity_m_per_s), laws)
 
 

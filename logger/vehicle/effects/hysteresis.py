@@ -14,12 +14,11 @@ makes a quick search half as long again. One that was not asked to try it finds 
 
 from __future__ import annotations
 
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 
-from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Sought
+from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Sought, Values
 from logger.vehicle.laws import Between, CornerLaws, Seen
 
 
@@ -36,7 +35,6 @@ def rates(p: Any, seen: Seen) -> tuple[Any]:
 
 
 class Hysteresis(ForceEffect):
-    name = "hysteresis"
     title = "friction in each suspension that gives before it slides (Bouc-Wen)"
     parameters = (
         Parameter("yield_force_n", 100.0, 0.0, 5000.0, 0.0, Scale.LINEAR, (30.0, 150.0),
@@ -53,7 +51,7 @@ class Hysteresis(ForceEffect):
     shown_by = "drive a smooth road and a rough one slowly, so that the suspension moves by a few millimetres"
     sought = Sought.ON_PARTS
 
-    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+    def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
         if p.yield_force_n == 0:
             return laws
         return laws.with_law(Between.BODY_AND_WHEEL, force, p, rates, memory=(0.0,))

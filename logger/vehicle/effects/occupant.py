@@ -6,16 +6,13 @@ frequency and damping ratio are those of the seat with it.
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 
-from logger.vehicle.effect import BodyEffect, Parameter, Scale
+from logger.vehicle.effect import BodyEffect, Parameter, Scale, Values
 from logger.vehicle.structure import Structure, hung
 
 
 class Occupant(BodyEffect):
-    name = "occupant"
     title = "passengers on their seats"
     parameters = (
         Parameter("mass_kg", 70.0, 0.0, 1000.0, 0.0, Scale.LINEAR, (60.0,),
@@ -27,7 +24,7 @@ class Occupant(BodyEffect):
     signature = "at 3 to 6 Hz the body moves less than the model says, and a little more below"
     shown_by = "drive with and without the people, or on a road that excites 2 to 8 Hz"
 
-    def structure(self, p: SimpleNamespace, structure: Structure) -> Structure:
+    def structure(self, p: Values, structure: Structure) -> Structure:
         if p.mass_kg == 0:
             return structure
         mass, omega = structure.sides * p.mass_kg, 2 * np.pi * p.frequency_hz

@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 
-from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Sought
+from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Sought, Values
 from logger.vehicle.laws import CornerLaws
 
 
 class OrificeDamping(ForceEffect):
-    name = "orifice_damping"
     title = "dampers whose force grows with the square of the rate: an orifice, or air"
     parameters = (
         Parameter("quadratic_damping_n_s2_per_m2", 2000.0, 0.0, 2e4, 0.0, Scale.LINEAR, (500.0, 4000.0),
@@ -24,7 +22,7 @@ class OrificeDamping(ForceEffect):
     shown_by = "move it weakly and strongly at the same frequency"
     sought = Sought.ON_RIGS
 
-    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+    def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
         size, damper = p.quadratic_damping_n_s2_per_m2, laws.damper
         return replace(laws, damper=lambda rate_mps: damper(rate_mps) + size * rate_mps * np.abs(rate_mps))
 

@@ -5,14 +5,11 @@ In a half car it is the load of one side, as all its masses are: half of what th
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
-from logger.vehicle.effect import Parameter, Scale, VehicleEffect
+from logger.vehicle.effect import Parameter, Scale, Values, VehicleEffect
 from logger.vehicle.vehicle import Vehicle, with_load
 
 
 class Payload(VehicleEffect):
-    name = "payload"
     title = "more sprung mass than the model says"
     parameters = (
         Parameter("mass_kg", 80.0, 0.0, 5000.0, 0.0, Scale.LINEAR, (10.0, 60.0, 200.0),
@@ -23,7 +20,7 @@ class Payload(VehicleEffect):
     shown_by = "drive a road with long waves, or weigh the car"
     needs_body = True
 
-    def vehicle(self, p: SimpleNamespace, vehicle: Vehicle) -> Vehicle:
+    def vehicle(self, p: Values, vehicle: Vehicle) -> Vehicle:
         return with_load(vehicle, p.mass_kg)
 
 

@@ -7,17 +7,14 @@ of dampers see the laws that ``learn`` tries. A spring that a car's weight press
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 
-from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Sought
+from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Sought, Values
 from logger.vehicle.laws import CornerLaws
 from logger.vehicle.vehicle import Vehicle
 
 
 class Play(ForceEffect):
-    name = "play"
     title = "play of the springs: in a seat, a bush or a joint"
     parameters = (
         Parameter("half_gap_m", 0.0005, 0.0, 0.02, 0.0, Scale.LINEAR, (0.0002, 0.0008, 0.003),
@@ -33,7 +30,7 @@ class Play(ForceEffect):
         axles = [one for one in (vehicle.front, vehicle.rear) if one is not None]
         return None if any(one.suspension_stiffness_n_per_m for one in axles) else "it needs a spring"
 
-    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+    def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
         gap_m, stiffness = p.half_gap_m, laws.stiffness_n_per_m
         if gap_m * stiffness == 0:
             return laws

@@ -5,14 +5,11 @@ F = k x + k3 x^3, with x the travel from where the car rests.
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
-from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale
+from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Values
 from logger.vehicle.laws import CornerLaws
 
 
 class ProgressiveSpring(ForceEffect):
-    name = "progressive_spring"
     title = "cubic hardening of the suspension springs"
     parameters = (
         Parameter("cubic_stiffness_n_per_m3", 1e6, -2e7, 1e9, 0.0, Scale.LINEAR, (3e5, 3e6, 3e7),
@@ -23,7 +20,7 @@ class ProgressiveSpring(ForceEffect):
     signature = "the spring is stiffer at large travel: the body bounces faster on bumps than on a smooth road"
     shown_by = "drive slowly over large bumps or dips, so that the suspension travels several centimetres"
 
-    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+    def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
         return laws.with_spring(lambda travel_m: p.cubic_stiffness_n_per_m3 * (travel_m * travel_m * travel_m))
 
 

@@ -7,14 +7,12 @@ The half car becomes a full one: twice its masses on four wheels, the left ones 
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
-from logger.vehicle.effect import Parameter, Scale, VehicleEffect
+from logger.vehicle.effect import Parameter, Scale, Values, VehicleEffect
 from logger.vehicle.vehicle import Vehicle
 
 
 class Roll(VehicleEffect):
-    name = "roll"
     title = "left and right tracks differ: a full car"
     parameters = (
         Parameter("track_width_m", 1.5, 0.5, 3.0, None, Scale.LOG, (1.5,), "from left to right wheels"),
@@ -33,7 +31,7 @@ class Roll(VehicleEffect):
             return f"a {vehicle.model.replace('_', ' ')} cannot become a full car; it needs a half car"
         return None if two_tracks else "the profile has one track; it needs elevation_right_m"
 
-    def vehicle(self, p: SimpleNamespace, vehicle: Vehicle) -> Vehicle:
+    def vehicle(self, p: Values, vehicle: Vehicle) -> Vehicle:
         assert vehicle.pitch_inertia_kg_m2 is not None
         return replace(
             vehicle,

@@ -10,13 +10,12 @@ which looks like a resonance there.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from types import SimpleNamespace
 
 import numpy as np
 
 from logger.arrays import Complex
 from logger.dsp.filters import butterworth
-from logger.vehicle.effect import Misalignment, Parameter, Scale, SensorEffect
+from logger.vehicle.effect import Misalignment, Parameter, Scale, SensorEffect, Values
 
 _HIGHEST = 8
 # Of the sample rate, where a filter that was run on the samples is tried: below about a fifth a sensor's does as well.
@@ -30,7 +29,6 @@ _NEAR = 1.5
 
 
 class SensorBandwidth(SensorEffect):
-    name = "sensor_bandwidth"
     title = "the sensor's own low-pass"
     parameters = (
         Parameter("cutoff_hz", 25.0, 0.5, 2000.0, float("inf"), Scale.RECIPROCAL, (15.0, 50.0, 1000.0),
@@ -80,7 +78,7 @@ class SensorBandwidth(SensorEffect):
         """Where the record has lost what lies above."""
         return seen.low_pass is not None and abs(np.log(values["cutoff_hz"] / seen.low_pass[0])) < np.log(_NEAR)
 
-    def factor(self, p: SimpleNamespace, s: Complex) -> Complex:
+    def factor(self, p: Values, s: Complex) -> Complex:
         return butterworth(int(p.order), s, p.cutoff_hz, sampled_hz=p.sampled_hz)
 
 

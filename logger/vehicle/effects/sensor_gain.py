@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 
 from logger.arrays import Complex
-from logger.vehicle.effect import Parameter, Scale, SensorEffect
+from logger.vehicle.effect import Parameter, Scale, SensorEffect, Values
 
 
 class SensorGain(SensorEffect):
-    name = "sensor_gain"
     title = "scale error of the sensor"
     parameters = (
         Parameter("gain", 1.05, 0.2, 5.0, 1.0, Scale.LOG, (0.93, 1.07), "reading over true acceleration"),
@@ -23,7 +20,7 @@ class SensorGain(SensorEffect):
     found_of = ("velocity", "displacement", "force", "travel")
     stage = 2
 
-    def factor(self, p: SimpleNamespace, s: Complex) -> Complex:
+    def factor(self, p: Values, s: Complex) -> Complex:
         return np.full_like(s, p.gain)
 
 

@@ -5,16 +5,13 @@ Between body and sensor lies the transmissibility (2 z w s + w^2) / (s^2 + 2 z w
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 import numpy as np
 
 from logger.arrays import Complex
-from logger.vehicle.effect import Misalignment, Parameter, Scale, SensorEffect, resonances_hz
+from logger.vehicle.effect import Misalignment, Parameter, Scale, SensorEffect, Values, resonances_hz
 
 
 class SensorMountResonance(SensorEffect):
-    name = "sensor_mount_resonance"
     title = "the bracket or console under the sensor resonates"
     parameters = (
         Parameter("frequency_hz", 25.0, 2.0, 400.0, float("inf"), Scale.RECIPROCAL,
@@ -33,7 +30,7 @@ class SensorMountResonance(SensorEffect):
         return [{"frequency_hz": frequency_hz, "damping_ratio": ratio} for ratio in damping.trials
                 for frequency_hz in resonances_hz(frequency.trials[0], frequency.trials[-1], ratio)]
 
-    def factor(self, p: SimpleNamespace, s: Complex) -> Complex:
+    def factor(self, p: Values, s: Complex) -> Complex:
         omega = 2 * np.pi * p.frequency_hz
         through = 2 * p.damping_ratio * omega * s + omega**2
         return np.asarray(through / (s * s + through))

@@ -6,14 +6,12 @@ Its acceleration is z'' + x theta'', nose up positive, with x ahead of the centr
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
-from logger.vehicle.effect import Parameter, Scale, VehicleEffect
+from logger.vehicle.effect import Parameter, Scale, Values, VehicleEffect
 from logger.vehicle.vehicle import Vehicle
 
 
 class SensorOffset(VehicleEffect):
-    name = "sensor_offset"
     title = "the sensor sits ahead of the centre of gravity, or behind it, and feels pitch"
     parameters = (
         Parameter("offset_m", 0.3, -3.0, 3.0, 0.0, Scale.LINEAR, (-0.3, 0.3),
@@ -28,7 +26,7 @@ class SensorOffset(VehicleEffect):
     def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:
         return "a quarter car does not pitch" if vehicle.rear is None else None
 
-    def vehicle(self, p: SimpleNamespace, vehicle: Vehicle) -> Vehicle:
+    def vehicle(self, p: Values, vehicle: Vehicle) -> Vehicle:
         return replace(vehicle, sensor=replace(vehicle.sensor, ahead_m=p.offset_m))
 
 

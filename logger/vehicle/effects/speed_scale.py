@@ -5,17 +5,14 @@ The car was where the recorded distance, divided by the scale, says.
 
 from __future__ import annotations
 
-from types import SimpleNamespace
-
 from logger.arrays import Array
-from logger.vehicle.effect import DriveEffect, Misalignment, Parameter, Scale
+from logger.vehicle.effect import DriveEffect, Misalignment, Parameter, Scale, Values
 
 # So little moves all waves alike: a search can see from it how much it takes. Runs lie wrong from the second on.
 _LITTLE, _WRONG = 1e-5, 0.0005
 
 
 class SpeedScale(DriveEffect):
-    name = "speed_scale"
     title = "the recorded speed and distance are wrong by a factor"
     parameters = (
         Parameter("scale", 1.01, 0.7, 1.4, 1.0, Scale.LOG, (0.98, 1.02), "recorded over true",
@@ -32,7 +29,7 @@ class SpeedScale(DriveEffect):
         wrong = [seen.scale] if abs(seen.scale - 1) > _WRONG else []
         return [{"scale": scale} for scale in (1 + _LITTLE, *wrong)]
 
-    def driven(self, p: SimpleNamespace, distance_m: Array) -> Array:
+    def driven(self, p: Values, distance_m: Array) -> Array:
         return distance_m / p.scale
 
 

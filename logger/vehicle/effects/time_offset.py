@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
-from types import SimpleNamespace
 
 import numpy as np
 
 from logger.arrays import Complex
-from logger.vehicle.effect import Misalignment, Parameter, Scale, SensorEffect
+from logger.vehicle.effect import Misalignment, Parameter, Scale, SensorEffect, Values
 from logger.vehicle.vehicle import OWN_NAMES
 
 # So little moves all waves alike: a search can see from it how much it takes. Runs lie wrong from the second on.
@@ -21,7 +20,6 @@ most; such recorders take 100 samples a second or more. A longer delay is physic
 
 
 class TimeOffset(SensorEffect):
-    name = "time_offset"
     title = "the acceleration is late against the position"
     parameters = (
         Parameter("delay_s", 0.02, -2.0, 2.0, 0.0, Scale.LINEAR, (-0.02, 0.02), "late positive, early negative",
@@ -47,7 +45,7 @@ class TimeOffset(SensorEffect):
         cutoff_hz, order = seen.low_pass
         return abs(values["delay_s"]) < _THIRD / (np.sin(np.pi / (2 * order)) * 2 * np.pi * cutoff_hz)
 
-    def factor(self, p: SimpleNamespace, s: Complex) -> Complex:
+    def factor(self, p: Values, s: Complex) -> Complex:
         return np.exp(-s * p.delay_s)
 
 

@@ -7,14 +7,12 @@ out (Eq 4.12 of Blum 2015).
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
-from logger.vehicle.effect import ForceEffect, Parameter, Scale
+from logger.vehicle.effect import ForceEffect, Parameter, Scale, Values
 from logger.vehicle.laws import CornerLaws
 
 
 class TireDamping(ForceEffect):
-    name = "tire_damping"
     title = "viscous damping of the tires"
     parameters = (
         Parameter("tire_damping_n_s_per_m", 150.0, 0.0, 3000.0, 0.0, Scale.LINEAR, (60.0, 300.0),
@@ -25,7 +23,7 @@ class TireDamping(ForceEffect):
     signature = "wheel hop is weaker than in the model and higher frequencies stronger; nothing changes below 5 Hz"
     shown_by = "drive a rough, patched road at 15 to 25 m/s, where the wheels hop"
 
-    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+    def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
         return replace(laws, tire_damping_n_s_per_m=laws.tire_damping_n_s_per_m + p.tire_damping_n_s_per_m)
 
 

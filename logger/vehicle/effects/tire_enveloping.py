@@ -6,14 +6,12 @@ What lies under the patch is averaged evenly, so that waves as short as the patc
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
-from logger.vehicle.effect import Parameter, Scale, VehicleEffect
+from logger.vehicle.effect import Parameter, Scale, Values, VehicleEffect
 from logger.vehicle.vehicle import Vehicle
 
 
 class TireEnveloping(VehicleEffect):
-    name = "tire_enveloping"
     title = "another contact length than the model's"
     parameters = (
         Parameter("contact_patch_m", 0.25, 0.0, 1.0, None, Scale.LINEAR, (0.03, 0.08, 0.14, 0.2, 0.28, 0.36, 0.5),
@@ -27,7 +25,7 @@ class TireEnveloping(VehicleEffect):
     replaces = ("contact_patch_m",)
     needs_road = True
 
-    def vehicle(self, p: SimpleNamespace, vehicle: Vehicle) -> Vehicle:
+    def vehicle(self, p: Values, vehicle: Vehicle) -> Vehicle:
         return replace(vehicle, contact_patch_m=p.contact_patch_m)
 
 

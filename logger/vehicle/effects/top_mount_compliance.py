@@ -7,14 +7,12 @@ damper plus F' / k.
 from __future__ import annotations
 
 from dataclasses import replace
-from types import SimpleNamespace
 
-from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale
+from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Values
 from logger.vehicle.laws import CornerLaws
 
 
 class TopMountCompliance(ForceEffect):
-    name = "top_mount_compliance"
     title = "a rubber mount in series with each damper"
     parameters = (
         Parameter("mount_stiffness_n_per_m", 2e5, 5e3, 1e8, float("inf"), Scale.RECIPROCAL, (6e4, 3e5, 1.5e6),
@@ -25,7 +23,7 @@ class TopMountCompliance(ForceEffect):
     signature = "the dampers seem weaker at wheel hop than at body bounce, and hop is at a slightly higher frequency"
     shown_by = "drive a rough road at several speeds, so that bounce and hop are both excited"
 
-    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+    def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
         return replace(laws, mount_n_per_m=1 / (1 / laws.mount_n_per_m + 1 / p.mount_stiffness_n_per_m))
 
 

@@ -11,7 +11,6 @@ _METHOD = """def record(self, p, recording):
 
 
 class ChangingGain(Family):
-    name = "changing_gain"
     title = "a gain that changes as a run goes on"
     related_effects = ("sensor_gain",)
     kind = "RecordEffect"

@@ -24,7 +24,6 @@ _OF = {"springs": ("travel_m", "BODY_AND_WHEEL", "the body bounces"),
 
 
 class ChangingStiffness(Family):
-    name = "changing_stiffness"
     title = "a stiffness that changes as a run goes on"
     source = "a tire's stiffness by its pressure: J. Y. Wong, Theory of Ground Vehicles (2008), chapter 1"
     shown_by = "drive one rough road for half an hour from cold, recorded as one run"

@@ -42,7 +42,6 @@ _DAMPERS = "dampers whose damping changes with the driving speed"
 
 
 class ChangingWithSpeed(Family):
-    name = "changing_with_speed"
     title = "a damping or a stiffness that changes with the driving speed"
     signature = "runs at different speeds ask for different numbers of one car"
     shown_by = "drive one road slowly and fast"

@@ -37,7 +37,6 @@ _AT_LIMIT = (0.98, 0.8)  # of the greatest reading
 
 
 class Clipping(Family):
-    name = "clipping"
     title = "a record that is clipped"
     kind = "RecordEffect"
     source = "data sheets of accelerometers give a range that they do not leave"

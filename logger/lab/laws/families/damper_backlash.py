@@ -35,7 +35,6 @@ def laws(self, p, laws):
 
 
 class DamperBacklash(Family):
-    name = "damper_backlash"
     title = "play in the mounts of the dampers"
     related_effects = ("top_mount_compliance",)
     source = "M. Nordin, P.-O. Gutman, Automatica 38 (2002) 1633: mechanical systems with backlash"

@@ -32,7 +32,6 @@ _LOSSES = (3e-5, 3e-4, 3e-3)
 
 
 class DamperHeat(Family):
-    name = "damper_heat"
     title = "dampers that fade as they grow hot"
     related_effects = ("damper_blow_off",)
     source = ("O. Reynolds, Phil. Trans. Royal Society 177 (1886) 157: viscosity by temperature; J. C. Dixon, The "

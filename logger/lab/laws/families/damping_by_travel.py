@@ -9,7 +9,6 @@ _SHARE = 0.3  # of the damper's own force
 
 
 class DampingByTravel(Family):
-    name = "damping_by_travel"
     title = "a damping that goes with the travel of the suspensions"
     related_effects = ("damper_blow_off", "damper_asymmetry", "progressive_spring")
     source = "J. C. Dixon, The Shock Absorber Handbook (2007), chapter 3: position-dependent damping"

@@ -23,7 +23,6 @@ _METHOD = """def laws(self, p, laws):
 
 
 class ExtensionStop(Family):
-    name = "extension_stop"
     title = "a stop in the suspensions' extension"
     related_effects = ("bump_stop", "progressive_spring")
     source = "K. H. Hunt and F. R. E. Crossley, J. Applied Mechanics 42 (1975) 440: contact with damping"

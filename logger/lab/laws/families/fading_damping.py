@@ -20,7 +20,6 @@ _METHOD = """def laws(self, p, laws):
 
 
 class FadingDamping(Family):
-    name = "fading_damping"
     title = "a damping that changes as a run goes on"
     source = "J. C. Dixon, The Shock Absorber Handbook, 2007, section 6.7"
     signature = "the body and the wheels ring longer, or less long, as a run goes on"

@@ -33,7 +33,6 @@ _SHARE = 0.01  # of what its stiffness answers to its length: tried
 
 
 class FlatSpot(Family):
-    name = "flat_spot"
     title = "a flat spot of a tire"
     source = ("P. W. A. Zegelaar, The Dynamic Response of Tyres to Brake Torque Variations and Road Unevennesses "
               "(Delft, 1998)")

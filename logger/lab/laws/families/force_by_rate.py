@@ -10,7 +10,6 @@ from logger.lab.laws.draft import LawContext
 
 
 class ForceByRate(CurveFamily):
-    name = "force_by_rate"
     title = "a force by the rate of the suspensions"
     related_effects = ("damper_blow_off", "damper_asymmetry", "dry_friction")
     shown_by = "drive the same road slowly and fast, or a smooth and a rough one"

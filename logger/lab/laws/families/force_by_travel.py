@@ -12,7 +12,6 @@ _SHARE = 0.3  # of the spring's own force
 
 
 class ForceByTravel(CurveFamily):
-    name = "force_by_travel"
     title = "a force by the travel of the suspensions"
     related_effects = ("progressive_spring", "bump_stop")
     shown_by = "drive a rough road, or over obstacles, so that the suspension travels far"

@@ -20,7 +20,6 @@ HANDED_ON = ("def laws(self, p, laws):\n"
 
 
 class FrictionWithMemory(Family):
-    name = "friction_with_memory"
     title = "friction with memory in the suspensions"
     related_effects = ("hysteresis", "dry_friction")
     source = ("R. Bouc, Proc. 4th Conf. on Nonlinear Oscillation, Prague (1967) 315; Y.-K. Wen, J. Eng. Mech. Div. "

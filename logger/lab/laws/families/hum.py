@@ -34,7 +34,6 @@ _STEP, _STEP_S = 1e-5, 1e-4
 
 
 class Hum(Family):
-    name = "hum"
     title = "a hum that the road does not cause"
     kind = "RecordEffect"
     source = "orders of engines and machines (ISO 20816-1:2016)"

@@ -32,7 +32,6 @@ def structure(self, p, structure):
 
 
 class HungMass(Family):
-    name = "hung_mass"
     title = "a mass on a spring on the body or the wheels"
     related_effects = ("occupant", "body_bending", "payload", "cg_shift")
     kind = "BodyEffect"

@@ -37,7 +37,6 @@ def structure(self, p, structure):
 
 
 class InertiaBehindSpring(Family):
-    name = "inertia_behind_spring"
     title = "inertia in the suspensions, maybe behind a spring"
     related_effects = ("top_mount_compliance", "hysteresis")
     source = ("M. C. Smith, IEEE Trans. Automatic Control 47 (2002) 1648: the inerter; W. C. Flower, SAE 850975 "

@@ -63,7 +63,6 @@ _STANDS_OUT = 10.0
 
 
 class LooseSensor(Family):
-    name = "loose_sensor"
     title = "a sensor that lies loose on the body"
     related_effects = ("sensor_mount_resonance", "sensor_gain")
     kind = "RecordEffect"

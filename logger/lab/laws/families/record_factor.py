@@ -27,7 +27,6 @@ _HZ = (2.0, 5.0, 10.0, 18.0, 28.0)
 
 
 class RecordFactor(Family):
-    name = "record_factor"
     title = "a correction between body and record"
     related_effects = ("sensor_bandwidth", "sensor_mount_resonance", "body_bending", "sensor_gain")
     kind = "SensorEffect"

@@ -27,7 +27,6 @@ _TRIED, _MOST = (0.3, 1.0), 30.0  # of the damper's own damping
 
 
 class Skyhook(Family):
-    name = "skyhook"
     title = "dampers that resist how fast the body moves against the ground"
     related_effects = ("damper_asymmetry", "damper_blow_off")
     source = "D. Karnopp, M. J. Crosby and R. A. Harwood, Journal of Engineering for Industry 96 (1974)"

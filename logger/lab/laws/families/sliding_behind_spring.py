@@ -34,7 +34,6 @@ def rates(p, seen):
 
 
 class SlidingBehindSpring(Family):
-    name = "sliding_behind_spring"
     title = "what slides behind a spring in a part on its bench"
     related_effects = ("hysteresis", "top_mount_compliance", "dry_friction")
     source = ("F. H. Norton, The Creep of Steel at High Temperatures (1929); P. Perzyna, Advances in Applied Mechanics "

@@ -38,7 +38,6 @@ squares, so that no slope leads far."""
 
 
 class SmoothedProfile(Family):
-    name = "smoothed_profile"
     title = "a profile that lacks short waves"
     related_effects = ("tire_enveloping", "sensor_mount_resonance", "sensor_bandwidth")
     kind = "RoadEffect"

@@ -20,7 +20,6 @@ def rates(p, seen):
 
 
 class SpringWithMemory(Family):
-    name = "spring_with_memory"
     title = "a spring with memory in the suspensions: rubber that creeps"
     related_effects = ("top_mount_compliance", "hysteresis")
     source = ("J. C. Maxwell, Phil. Trans. R. Soc. 157 (1867) 49; for rubber: M. Berg, Vehicle System Dynamics 30 "

@@ -13,7 +13,6 @@ _SHARE = 0.3  # of the tire's own force
 
 
 class TireForce(CurveFamily):
-    name = "tire_force"
     title = "a force by the deflection of the tires"
     related_effects = ("bump_stop", "progressive_spring", "wheel_lift")
     shown_by = "drive a rough road, or over obstacles, fast, so that the tires are pressed far"

@@ -34,7 +34,6 @@ _RADII_M = (0.1, 0.5)
 
 
 class WheelTurns(Family):
-    name = "wheel_turns"
     title = "a force that comes round with the wheels' turns"
     source = "a mass that turns beside its axle (J. P. Den Hartog, Mechanical Vibrations, 1956, section 6.1)"
     signature = "it repeats along the road, whatever the speed, and grows with the square of the speed"
