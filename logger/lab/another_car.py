@@ -3,26 +3,33 @@
 Problem: with another car's file every effect that reduces the difference seems to be missing. Solution: where a model
 explains next to nothing of what was measured, cars with very different masses, springs, dampers and tires are tried. If
 one of them explains the record, and several of its numbers differ by far more than they are uncertain, the record is of
-another car: a missing effect changes few numbers. A large change by one effect can look like several numbers, so that
-the other car has to explain more than any known effect does in a car with this one's numbers.
+another car: a missing effect changes few numbers. A large change by one effect can look like several numbers, as of a
+sensor far behind the centre of gravity, so that the other car has to explain more than any known effect does in a car
+with this one's numbers: one round of the search for effects, on the car as its file has it, says how much (numbers that
+were refitted to such a record are no car's any more).
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
 from logger.arrays import Array
+from logger.lab.diagnosis import obstacles_of
 from logger.lab.likelihood.map_fit import align, fit
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import CONFLICT_SIGMA, UNUSUAL_SIGMA, Tolerance
+from logger.lab.selection.candidate_fit import CandidateFit
+from logger.lab.selection.screening import Baseline, Screened, misalignment
+from logger.lab.selection.stepwise import Search
 from logger.runs import Run, normalised_rms_error
 from logger.simulation.virtual_drive import SimulatedRuns
-from logger.vehicle.effect import Chosen
+from logger.vehicle.effect import Chosen, Effect, ForceEffect
 from logger.vehicle.effects.sensor_gain import EFFECT as SENSOR_GAIN
+from logger.vehicle.stepping_loop import COMPILED
 from logger.vehicle.vehicle import Vehicle
 
 POOR_ERROR, _GOOD_ERROR = 0.8, 0.35
@@ -130,3 +137,20 @@ def _cross_entropy_search(wide: Posterior, effects: Sequence[Chosen], error_of: 
         best_of = drawn[ranks[:8]]
         middle, spread = best_of.mean(axis=0), np.maximum(best_of.std(axis=0), 0.03 * deviations)
     return best
+
+
+def error_with_best_effect(runs: SimulatedRuns, vehicle: Vehicle, present: Sequence[Chosen],
+                           known: Mapping[str, Effect], numbers: float) -> float:
+    """Error of this car with the one effect that explains most, its numbers refitted under their prior; infinite
+    where none can be tried. Without the compiler forces are not, as each would take minutes."""
+    posterior = Posterior(runs, vehicle, Tolerance(numbers=numbers))
+    obstacles = obstacles_of(posterior, known, present)
+    tried = [one for name, one in known.items()
+             if name not in obstacles and (COMPILED or not isinstance(one, ForceEffect))]
+    if not tried:
+        return np.inf
+    start = posterior.start(present)
+    search: Search[Baseline, Screened, CandidateFit] = Search(tried, len(present), misalignment(posterior, start))
+    nominal = align(posterior, start).with_number_slopes(posterior.number_slopes(start, posterior.prior.steps))
+    fits = search.round(Baseline.of(nominal), tried).fits
+    return min((posterior.error(one.found.state) for one in fits), default=np.inf)

@@ -22,7 +22,7 @@ from logger.dsp.repeated_samples import find_repeats, stretches_of
 from logger.dsp.whole_record import thinned
 from logger.errors import BadInput
 from logger.lab.another_car import AnotherCar, another_car, reading_gain
-from logger.lab.best_effect import error_with_best_effect
+from logger.lab.another_car import error_with_best_effect
 from logger.lab.likelihood.lag import SLOWEST_MPS
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.whittle import HIGHEST_OF_RATE, LOWEST_HZ

@@ -15,6 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from logger.lab.laws.draft import Draft
+from logger.lab.likelihood.noise_floor import SURE_SIGMA
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.standard_errors import deviations_from_null, standard_errors
 from logger.lab.selection.evidence import INDISTINGUISHABLE
@@ -22,9 +23,6 @@ from logger.lab.selection.screening import Baseline
 from logger.lab.selection.stepwise import is_outside_data
 from logger.vehicle.effect import Chosen
 from logger.vehicle.uncertain import NumberErrors
-
-SIGMA = 2.0
-"""A number differs from another where more standard errors than this lie between (by chance, one time in 22)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,12 +69,12 @@ def refusal(draft: Draft, model: Baseline) -> Refusal | None:
     errors = standard_errors(model.linear)
     one = next(each for each in errors.effects if each.effect.name == draft.name)
     if does_nothing(one, errors.numbers):
-        return Refusal(draft.title, f"its strength is within {SIGMA:g} standard errors of doing nothing")
+        return Refusal(draft.title, f"its strength is within {SURE_SIGMA:g} standard errors of doing nothing")
     if why := _beyond(model.posterior, one):
         return Refusal(draft.title, why)
-    if draft.family.is_straight(draft, one, SIGMA):
-        return Refusal(draft.title, f"it is a straight line within {SIGMA:g} standard errors, as a number of the car "
-                                    "already is")
+    if draft.family.is_straight(draft, one, SURE_SIGMA):
+        return Refusal(draft.title, f"it is a straight line within {SURE_SIGMA:g} standard errors, as a number of the "
+                                    "car already is")
     return None
 
 
@@ -90,8 +88,8 @@ def known_instead(draft: Draft, nearest: Nearest | None) -> Refusal | None:
 
 def does_nothing(one: Chosen, errors: NumberErrors) -> bool:
     """Whether the strengths of a fitted law are together no farther from doing nothing than chance takes one number by
-    ``SIGMA`` standard errors; or none of them is known. A law without a strength (its number is a length, on a scale
-    that has no zero) always does something."""
+    ``SURE_SIGMA`` standard errors; or none of them is known. A law without a strength (its number is a length, on a
+    scale that has no zero) always does something."""
     from scipy.special import gammaincc
 
     strengths = [each for each in one.effect.parameters if each.is_free and each.null is not None]
@@ -101,13 +99,13 @@ def does_nothing(one: Chosen, errors: NumberErrors) -> bool:
     if not strengths:
         return True
     if len(strengths) == 1:
-        return deviations_from_null(one) < SIGMA
+        return deviations_from_null(one) < SURE_SIGMA
     names = list(errors.standard_errors)
     places = [names.index(f"{one.effect.name}.{each.name}") for each in strengths]
     off = np.array([(one.values[each.name] - float(each.null or 0.0)) / one.standard_errors[each.name]
                     for each in strengths])
     squares = float(off @ np.linalg.pinv(errors.matrix()[np.ix_(places, places)], hermitian=True) @ off)
-    return bool(gammaincc(len(off) / 2, squares / 2) > gammaincc(0.5, SIGMA**2 / 2))
+    return bool(gammaincc(len(off) / 2, squares / 2) > gammaincc(0.5, SURE_SIGMA**2 / 2))
 
 
 def _beyond(posterior: Posterior, one: Chosen) -> str:

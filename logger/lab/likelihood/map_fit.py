@@ -39,7 +39,6 @@ two models (``selection.evidence``)."""
 _STEPS = 5
 """Levenberg-Marquardt steps between two linearisations. A judgement: a fit goes on at the next one."""
 _ALIGNING_SHARE = 0.02
-_MOST_ROUNDS = 40
 """Alignment in the course of a fit ends with a round that gains a smaller share of the whole gain: the fit aligns again
 in its next round."""
 _NEAR_M = 0.02
@@ -106,8 +105,8 @@ def fit_to_the_end(start: LinearModel, numbers: Sequence[Array] | None = None) -
     does, as play in its dampers does, the derivatives of one round say little of the next, and the rounds of ``fit``
     end on the way. It begins again where it ended, with derivatives over the prior's steps: those over fine steps may
     stop in a ripple of the score."""
-    found = fit(start, numbers, at_most=_MOST_ROUNDS)
-    while (again := fit(found, at_most=_MOST_ROUNDS)).score < found.score - CONVERGED:
+    found = fit(start, numbers, at_most=40)
+    while (again := fit(found, at_most=40)).score < found.score - CONVERGED:
         found = again
     return found
 
@@ -191,7 +190,7 @@ def _align_from(start: LinearModel, min_share: float) -> LinearModel:
     """Gauss-Newton steps of the distance errors, each with their most likely size."""
     best = now = start
     first = least = start.score
-    for _ in range(_MOST_ROUNDS):
+    for _ in range(40):
         state, found = now.state, now.fit_record_errors(now.state.predictions)
         now = LinearModel(now.posterior, now.posterior.state_at(state.effects, state.logs, found.record, now.size))
         gained = least - now.score

@@ -4,7 +4,8 @@ Problem: an error means little without the noise floor, below which no model com
 a car moves no sensor, so that what is there is the sensor's own noise, unless that went through the recorder's filter
 as well: then the quietest band that passes is noise. Every other band that is no louder is pooled with it, the quietest
 first. Where the highest frequencies are outside of the pass band, because somebody filtered the record, the quietest
-remaining band is the first. What runs that repeat each other differ by is noise as well.
+remaining band is the first. What runs that repeat each other differ by is noise as well; and so is what does not grow
+with the motion: what a car does grows with how much it is shaken, what a sensor adds does not.
 """
 
 from __future__ import annotations
@@ -16,7 +17,6 @@ import numpy as np
 
 from logger.arrays import Array
 from logger.dsp.white_noise import EQUAL_SIGMA, OF_QUIETEST, pooled
-from logger.lab.likelihood.growing_power import steady_power
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.priors import UNUSUAL_SIGMA
 from logger.lab.likelihood.repeats import find_repeats
@@ -31,6 +31,8 @@ _FILTERED = 0.75
 # frequencies at most that share of their power, which the recorder's filter leaves: what a car leaves falls towards the
 # highest band, and the sensor's own noise does not pass through the filter (judgements).
 _FLAT_SHARE, _FILTERED_SHARE = 0.22, 0.01
+SURE_SIGMA = 2.0
+"""A number surely differs from another where more standard errors than this lie between (by chance, one time in 22)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -189,3 +191,32 @@ def floor_error(posterior: Posterior, noise: NoiseLevel) -> float:
     runs = posterior.runs.runs
     share = np.average([one.share_passed for one in runs], weights=[one.count - one.first for one in runs])
     return float(noise.deviation_mps2 * np.sqrt(share) / posterior.size_mps2)
+
+
+def steady_power(power: Array, motion: Array) -> Array:
+    """The part of the mean power (b,) that surely does not grow with the motion's, by powers (blocks, b) of both: what
+    grows is taken to be ``SURE_SIGMA`` standard errors more than it is found to be."""
+    grows, errors = growing_power(power, motion)
+    return np.maximum(power.mean(axis=0) - np.maximum(grows, 0.0) - SURE_SIGMA * errors, 0.0)
+
+
+def growing_power(power: Array, motion: Array) -> tuple[Array, Array]:
+    """The part of the mean power (b,) that grows with the motion's, and its standard error (b,), by powers (blocks, b)
+    of both. In each band the power, block by block, is regressed on that of the model's motion (weighted least squares,
+    as of gamma distributed powers); the intercept is noise, of whatever colour."""
+    worth = 0.947  # of a block with Hann's taper that overlaps the next by half, over one alone (P. D. Welch 1967)
+    grows, errors = np.zeros(power.shape[1]), np.full(power.shape[1], np.inf)
+    for band, (one, moved) in enumerate(zip(power.T, motion.T, strict=True)):
+        if len(one) < 4 or not np.ptp(moved) > 0 or not one.mean() > 0:
+            continue
+        # Counted from the mean, motion that hardly varies is no near copy of the ones.
+        columns = np.column_stack([np.ones(len(one)), moved / moved.mean() - 1])
+        expected = np.full(len(one), one.mean())
+        for _ in range(6):
+            weights = expected**-2
+            inverse = np.linalg.inv(columns.T @ (weights[:, None] * columns))
+            found = inverse @ (columns.T @ (weights * one))
+            expected = np.maximum(columns @ found, 0.1 * one.mean())
+        spread = float(weights @ (one - columns @ found) ** 2) / (worth * len(one) - 2)
+        grows[band], errors[band] = float(found[1]), float(np.sqrt(spread * inverse[1, 1] / worth))
+    return grows, errors

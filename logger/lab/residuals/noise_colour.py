@@ -15,8 +15,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from logger.arrays import Array
-from logger.lab.likelihood.growing_power import SURE_SIGMA, growing_power
-from logger.lab.likelihood.noise_floor import NoiseLevel
+from logger.lab.likelihood.noise_floor import SURE_SIGMA, NoiseLevel, growing_power
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.priors import UNUSUAL_SIGMA
 from logger.lab.likelihood.signals import JointBands
