@@ -84,22 +84,20 @@ _NO_READINGS = _Readings(np.empty(0, dtype=np.int64), np.empty(0), np.empty(0, d
 class GridResampler:
     """Jittered samples in, a uniform grid out; four samples late.
 
-    rate_hz      rate of the grid
-    max_gap_s    two readings further apart than this are not joined: the run ends and a new one begins at the
-                 second reading
+    rate_hz    rate of the grid
 
-    A step is that of the grid, or the readings' own spacing where it is known (``expect``).
+    Two readings further apart than ``MAX_GAP_S`` are not joined: the run ends and a new one begins at the second. A
+    step is that of the grid, or the readings' own spacing where it is known (``expect``).
 
     Between readings up to 3.5 steps apart the eight-point polynomial holds (for 100 Hz and three missing readings it is
-    within 0.4 % at 10 Hz); over longer holes, that only a fast grid can have within ``max_gap_s``, a straight line.
+    within 0.4 % at 10 Hz); over longer holes, that only a fast grid can have within so much, a straight line.
     Readings less than half a step after the last one, or not after it at all, are left out and counted in ``dropped``:
     a polynomial through two close readings would multiply their noise.
     """
 
-    def __init__(self, rate_hz: int, max_gap_s: float = MAX_GAP_S) -> None:
+    def __init__(self, rate_hz: int) -> None:
         self._rate_hz = rate_hz
         self._step_us = US_PER_S / rate_hz
-        self._max_gap_us = max_gap_s * US_PER_S
         self._spacing_us = self._step_us
         self.dropped = 0
         self._held = _NO_READINGS
@@ -116,7 +114,7 @@ class GridResampler:
         if not len(new):
             return []
         before_us = np.concatenate([self._held.t_us[-1:] if len(self._held) else new.t_us[:1], new.t_us[:-1]])
-        gaps = np.flatnonzero(new.t_us - before_us > self._max_gap_us).tolist()
+        gaps = np.flatnonzero(new.t_us - before_us > MAX_GAP_S * US_PER_S).tolist()
         runs = []
         for low, high in pairwise([0, *gaps, len(new)]):
             self._held = self._held.then(new.part(slice(low, high)))

@@ -91,7 +91,7 @@ class White:
         if low_pass.cutoff_hz is not None:
             memory = min(int(_FILTER_MEMORY_S * low_pass.kept_hz), min(map(len, residuals)) - 1)
             shape = levinson(_covariance(_sensor_shape(low_pass), low_pass.kept_hz)[: memory + 1])
-        deviation = max(_rms([shape(one) for one in residuals]), floor)
+        deviation = max(rms([shape(one) for one in residuals]), floor)
         whitener = PredictionWhitener(shape.start / deviation, shape.taps / deviation)
         return _whitening("white", [whitener] * len(residuals), residuals, 1,
                           f"white noise of {deviation:.3g} m/s2", {"deviation_mps2": deviation})
@@ -108,7 +108,7 @@ class Autoregressive:
         count = sum(map(len, residuals))
         most = min(_MOST_ORDER, count // _SAMPLES_PER_ORDER) if self.order is None else self.order
         reflections = burg(residuals, min(most, min(map(len, residuals)) - 1), floor)
-        power = _rms(residuals) ** 2 + floor**2
+        power = rms(residuals) ** 2 + floor**2
         powers = power * np.cumprod(np.concatenate([[1.0], 1 - reflections**2]))
         order = len(reflections)
         if self.order is None:
@@ -181,7 +181,8 @@ def _whitening(name: str, whiteners: list[PredictionWhitener], residuals: Sequen
     return Whitening(name, whiteners, parameters, deviance, words, levels)
 
 
-def _rms(parts: Sequence[Array]) -> float:
+def rms(parts: Sequence[Array]) -> float:
+    """Root-mean-square of all samples of signals [(n,), ...]."""
     return float(np.sqrt(sum((part**2).sum() for part in parts) / sum(map(len, parts))))
 
 

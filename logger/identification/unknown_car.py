@@ -192,11 +192,10 @@ class UnknownCar:
         power = np.abs(front) ** 2 + np.abs(rear) ** 2 + even * both.real - odd * both.imag
         return np.asarray((power * self._road_under(structure.contact_patch_m)) @ expected().T)
 
-    def expected_power(self, x: Array, roads: BlockRoads, gains: Array | None = None) -> tuple[Array, Array]:
+    def expected_power(self, x: Array, roads: BlockRoads) -> tuple[Array, Array]:
         """Of the road and of the noise, (b, k) and (b, 1)."""
-        gains = self.gains(x) if gains is None else gains
         waviness = roads.own + roads.stretch[self.spectra.stretch]
-        road = gains[self.speed] * np.exp(roads.level[:, None] + waviness[:, None] * self.slope)
+        road = self.gains(x)[self.speed] * np.exp(roads.level[:, None] + waviness[:, None] * self.slope)
         return road, self.noise[:, None] * np.exp(x[-1])
 
     def with_blocks(self, x: Array, roads: BlockRoads) -> tuple[BlockRoads, float]:
@@ -204,10 +203,13 @@ class UnknownCar:
         posterior density there, the blocks integrated out (Laplace), up to a constant."""
         gains = self.gains(x)[self.speed]
         noise = self.noise[:, None] * np.exp(x[-1])
-        level, own = roads.level, roads.own
-        own_slope = self.slope
+        level, own, own_slope = roads.level, roads.own, self.slope
+
+        def road_power() -> Array:
+            return gains * np.exp(level[:, None] + (own + roads.stretch[self.spectra.stretch])[:, None] * own_slope)
+
         for _ in range(_MOST_INNER):
-            road = gains * np.exp(level[:, None] + (own + roads.stretch[self.spectra.stretch])[:, None] * own_slope)
+            road = road_power()
             whole = road + noise
             share, ratio = road / whole, self.power / whole
             residual = self.weight * (ratio - 1) * share
@@ -219,8 +221,7 @@ class UnknownCar:
             level, own = level + move[:, 0], own + move[:, 1]
             if np.abs(move).max(initial=0.0) < _SMALL_MOVE:
                 break
-        found = BlockRoads(level, own, roads.stretch)
-        road = gains * np.exp(level[:, None] + (own + roads.stretch[self.spectra.stretch])[:, None] * own_slope)
+        found, road = BlockRoads(level, own, roads.stretch), road_power()
         whole = road + noise
         ratio = self.power / whole
         observed = _moments(self.weight * (road / whole) ** 2 * ratio, own_slope, _PRECISION)

@@ -138,14 +138,14 @@ def frequencies_hz(building: Masses) -> Array:
     return np.sqrt(np.sort(squares)) / (2 * np.pi)
 
 
-def released(building: Masses, samples: int = round(DURATION_S * RATE_HZ)) -> Array:
+def released(building: Masses) -> Array:
     """Acceleration (samples, 5) [m/s2] of the floors after the top was pulled aside and let go.
 
     As strong as to give the first peak of Eq 5.3 at the top.
     """
     first_peak_g, first_peak_s = 0.1978, 1.19
     pulled = np.linalg.solve(building.stiffness, np.eye(5)[4])
-    accel = free_decay(building, pulled / pulled[4], RATE_HZ, samples)
+    accel = free_decay(building, pulled / pulled[4], RATE_HZ, round(DURATION_S * RATE_HZ))
     around = slice(int((first_peak_s - 0.4) * RATE_HZ), int((first_peak_s + 0.4) * RATE_HZ))
     return accel * first_peak_g * STANDARD_GRAVITY_MPS2 / np.abs(accel[around, 4]).max()
 

@@ -30,10 +30,10 @@ from logger.api.question import function, named_numbers
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
 from logger.chart_data import Chart, Curves, Line, line
+from logger.identification.noise_models import rms
 from logger.lab.another_car import POOR_ERROR
 from logger.lab.compare import LabComparison, Standing
 from logger.lab.residual_tests.tests import ResidualTestResult
-from logger.lab.residuals.block_statistics import rms
 from logger.lab.residuals.breakdown import ModelResiduals, Part, frequencies, segments
 from logger.lab.residuals.force_state_map import Curve, ForceMap
 from logger.lab.selection.add_effect import BIAS_SIGMA, AddedEffects, Number

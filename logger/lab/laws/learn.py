@@ -23,6 +23,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from logger.fitting.information_matrix import inverse
 from logger.lab.diagnosis import LabDiagnosis, assess, search_effects
 from logger.lab.laws.draft import Draft, Family, LawContext
 from logger.lab.laws.refusals import Nearest, Refusal, known_instead, refusal
@@ -67,9 +68,7 @@ def _gauss_newton_trial(base: Baseline, draft: Draft, values: dict[str, float]) 
     gradient, information = linear.gradient(residuals, state.logs, white), linear.information(white)
     p = linear.count
     # A point of a curve beyond all motions has no derivative, and stays at 0.
-    size = np.sqrt(np.maximum(np.diag(information), 0.0))
-    scale = np.where(size > 0, size, 1.0)
-    step = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-8, hermitian=True) @ (gradient / scale) / scale
+    step = inverse(information) @ gradient
     without = np.linalg.solve(information[:p, :p], gradient[:p]) if p else np.empty(0)
     there = with_coordinates(effects, strengths, coordinates_of(effects, strengths) + step[p:])
     change = [step[p:] @ one for one in slopes]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from logger.dsp.whole_record import HALF_WIDTH_HZ
-from logger.identification.noise_models import LAGS, autocorrelation, autocorrelations
+from logger.identification.noise_models import LAGS, autocorrelation, autocorrelations, rms
 from logger.lab.likelihood.whittle import BLOCK_S
 from logger.lab.residual_tests.tests import (
     BANDS,
@@ -15,8 +15,7 @@ from logger.lab.residual_tests.tests import (
     ResidualTestResult,
     ResidualTests,
 )
-from logger.lab.residuals.block_statistics import mean_of_blocks, rms
-from logger.lab.residuals.spectral_lines import periodogram, strongest_line
+from logger.lab.residuals.statistics import mean_of_blocks, periodogram, strongest_line
 from logger.printable import percent
 from logger.runs import short_names
 

@@ -12,9 +12,9 @@ from logger.lab.residual_tests.tests import (
     ResidualTestResult,
     ResidualTests,
 )
-from logger.lab.residuals.block_statistics import band_pass, block_means, mean_of_blocks
 from logger.lab.residuals.breakdown import ModelResiduals
 from logger.lab.residuals.road_coherence import coherence_with_road
+from logger.lab.residuals.statistics import band_pass, block_means, mean_of_blocks
 from logger.printable import percent
 from logger.runs import are_on_rig
 from logger.vehicle.simulate import PASS_OF_RATE

@@ -12,7 +12,7 @@ from logger.lab.residual_tests.tests import (
     ResidualTestResult,
     ResidualTests,
 )
-from logger.lab.residuals.block_statistics import block_means, rank_correlation
+from logger.lab.residuals.statistics import block_means, rank_correlation
 from logger.runs import short_names
 
 

@@ -18,7 +18,7 @@ from logger.lab.residual_tests import run_residual_tests
 from logger.lab.residual_tests.tests import SIGNIFICANCE, ResidualEvidence, ResidualTestResults
 from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown
 from logger.lab.residuals.removed import Removed
-from logger.lab.residuals.spectral_lines import NEIGHBOURS, periodogram, strongest_line
+from logger.lab.residuals.statistics import NEIGHBOURS, periodogram, strongest_line
 from logger.runs import short_names
 
 

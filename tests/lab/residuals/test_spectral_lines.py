@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from logger.lab.residuals.spectral_lines import periodogram, strongest_line
+from logger.lab.residuals.statistics import periodogram, strongest_line
 
 
 def test_a_sine_is_heard_where_it_is() -> None:
