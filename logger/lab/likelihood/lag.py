@@ -21,12 +21,8 @@ WINDOW_S = 2.56
 """Length of a window: 256 samples at 100 Hz, a quick transform, two to four bounces of a body."""
 _LEAST_FREEDOM = 5
 """No slope is estimated with fewer degrees of freedom: Student's t at 5 % is above 2.6 there. A judgement."""
-_LEAST_READ = 0.9
-"""Share of a window that has to be read, lest the filling of the rest decides; a tenth moves a lag by less than its
-error."""
 RESOLVED_M = 0.1
 """A fifth of the shortest wave that is felt: places that are known better need no search."""
-_LOUDNESS_M = 20.0  # a level is taken over so much road: some car lengths, so that one pothole counts once
 SLOWEST_MPS = 0.5
 """A car that is slower stands: a length over its speed says nothing."""
 
@@ -105,8 +101,8 @@ def offset_by_correlation_m(distance_m: Array, measured_mps2: Array, prediction:
 
 
 def _equalised(samples: Array) -> Array:
-    """Samples along the road (n,) over their local r.m.s.: one pothole shall not decide."""
-    size = round(_LOUDNESS_M / RESOLVED_M)
+    """Samples along the road (n,) over their r.m.s. of 20 m, some car lengths: one pothole shall not decide."""
+    size = round(20.0 / RESOLVED_M)
     loud = np.sqrt(np.convolve(samples**2, np.full(size, 1 / size), "same"))[: len(samples)]
     return samples / np.maximum(loud, 0.3 * np.sqrt(np.mean(samples**2)) + 1e-9)
 
@@ -146,8 +142,8 @@ def _windows(number: int, run: Run, prediction: Array) -> list[tuple[float, ...]
         measured = run.measured_mps2[start : start + size]
         low = max(0, start - about - step - reach)
         high = min(run.count - size, start - about - step + reach)
-        if high < low or np.mean(read[start : start + size]) < _LEAST_READ:
-            continue
+        if high < low or np.mean(read[start : start + size]) < 0.9:
+            continue  # lest the filling of the rest decides; that of a tenth moves a lag by less than its error
         shifted = np.lib.stride_tricks.sliding_window_view(prediction[low : high + size], size)
         scale = np.sqrt((shifted**2).sum(axis=1) * (measured @ measured))
         correlation = np.divide(shifted @ measured, scale, out=np.zeros(len(shifted)), where=scale > 0)
