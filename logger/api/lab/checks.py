@@ -21,8 +21,7 @@ from logger.dsp.channel_faults import goes_against, longest_still, share_at_ends
 from logger.dsp.repeated_samples import find_repeats, stretches_of
 from logger.dsp.whole_record import thinned
 from logger.errors import BadInput
-from logger.lab.another_car import AnotherCar, another_car, reading_gain
-from logger.lab.another_car import error_with_best_effect
+from logger.lab.another_car import AnotherCar, another_car, error_with_best_effect, reading_gain
 from logger.lab.likelihood.lag import SLOWEST_MPS
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.whittle import HIGHEST_OF_RATE, LOWEST_HZ
