@@ -16,7 +16,6 @@ from math import degrees
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from logger.api.extraction import (
     RATE_HZ,
@@ -29,6 +28,7 @@ from logger.api.extraction import (
     folder_of,
     write_runs,
 )
+from logger.arrays import Array
 from logger.bounds import ACCELERATION, SPEED, samples_between
 from logger.dsp.repeated_samples import find_holds, resolution, still_until_s
 from logger.errors import BadInput
@@ -79,8 +79,6 @@ from logger.store.formats.logger_csv import (
 from logger.store.formats.record_checks import still_doubts
 from logger.store.formats.vehicle_file import read_model
 from logger.units import STANDARD_GRAVITY_MPS2
-
-Array = npt.NDArray[np.float64]
 
 _FLAT_TO_HZ = 38.0  # a run is (docs/at-the-desk.md)
 _CUT_S = 1.0  # to either side of a turn in the mount

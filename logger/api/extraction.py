@@ -14,11 +14,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from drivers.dump import open_dump
 from drivers.errors import SettingsError
 from drivers.readings import folder_name
+from logger.arrays import Array, Bools
 from logger.errors import BadInput
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.receiver_delay import CarriedDelay, combined
@@ -147,7 +147,6 @@ def _fixes(kept: Any, later_s: float) -> Fixes:
     return Fixes(time_s, speed_mps, lat_deg, lon_deg).part(apart(time_s))
 
 
-Array = npt.NDArray[np.float64]
 Tell = Callable[[str], None]
 
 RATE_HZ = 100.0
@@ -274,7 +273,7 @@ class Recorded:
     left_out: tuple[LeftOut, ...] = ()
 
 
-def apart(time_s: Array) -> npt.NDArray[np.bool_]:
+def apart(time_s: Array) -> Bools:
     """Which fixes (k,) come after those that are taken before them by as much as fixes do."""
     taken, last_s = np.zeros(len(time_s), dtype=np.bool_), -np.inf
     for index, fix_s in enumerate(time_s.tolist()):

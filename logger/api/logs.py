@@ -14,14 +14,12 @@ from drivers.dump import DumpHeader, open_dump
 from drivers.errors import DriverError
 from drivers.readings import GPS, Event, Fix
 from logger.api.shown import Shown, table
+from logger.arrays import Array, Bools
 from logger.errors import BadInput
 from logger.printable import word
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
-
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 
 _US = 1e-6
 

@@ -20,6 +20,7 @@ from logger.api.drives import read_run
 from logger.api.question import COMMON_IRI, COMMON_SPEED_MPS, IRI, SPEED, function
 from logger.api.shown import CommandResult, Shown, table
 from logger.api.vehicles import Model, model_of
+from logger.arrays import Bools, Complex
 from logger.chart_data import Array, Chart, Curves, Line, line
 from logger.errors import BadInput
 from logger.estimation.car_response import WAVE_NUMBERS_CPM
@@ -40,8 +41,6 @@ from logger.store.formats.vehicle_file import check_moves_itself
 from logger.vehicle.linearise import known_vehicle
 from logger.vehicle.modes import mode_errors
 from logger.vehicle.uncertain import cars_off
-
-Complex = npt.NDArray[np.complex128]
 
 _ONLY_DECAYS = ("era", "decrement")
 
@@ -280,7 +279,7 @@ def modes_of_drive(given: ChannelRecord | Path | str, question: ModesQuestion) -
 
 
 def _record(given: ChannelRecord | Path | str, question: ModesQuestion
-            ) -> tuple[str, float, float, Array, Array, npt.NDArray[np.bool_]]:
+            ) -> tuple[str, float, float, Array, Array, Bools]:
     """Name, start [s], rate [Hz], readings, speeds [m/s] and whether each is a reading."""
     path = given if isinstance(given, Path | str) else None
     if path is not None and (Path(path).is_dir() or SPEED_COLUMN in header_of(Path(path))):

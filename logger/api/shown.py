@@ -15,9 +15,6 @@ from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-import numpy as np
-import numpy.typing as npt
-
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import why_not_written, write_text
 from logger.left_out import left_out_json, left_out_lines
@@ -28,7 +25,6 @@ if TYPE_CHECKING:
     from logger.store.formats.record_checks import EvenRecord
 
 
-Array = npt.NDArray[np.float64]
 Row = tuple[str, object, str]
 """What it is called, a number or words, its unit."""
 

@@ -13,11 +13,9 @@ from dataclasses import dataclass, replace
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Bools
 from logger.fitting.information_matrix import whitening
-
-Array = npt.NDArray[np.float64]
 
 _FALLING = 0.5
 """Share of the expected gain before, above which the information is taken again: at a half steps still converge."""
@@ -61,14 +59,14 @@ class _Curvature:
     slopes before (r,), and itself (r,), 0 where it was cut short."""
 
     information: Array
-    moving: npt.NDArray[np.bool_]
+    moving: Bools
     whitening: Array
     correction: Array
     slopes: Array
     along: Array
 
     @staticmethod
-    def of(information: Array, moving: npt.NDArray[np.bool_]) -> _Curvature:
+    def of(information: Array, moving: Bools) -> _Curvature:
         """As the information says."""
         whiten = whitening(information[np.ix_(moving, moving)])
         nothing = np.zeros(len(whiten))

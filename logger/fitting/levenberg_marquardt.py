@@ -15,9 +15,8 @@ from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from logger.arrays import Array, Bools
 
 _KEPT_SHARE = 0.7
 _LEAST_THAT_DAMPS = 1e-4
@@ -111,7 +110,7 @@ def minimise(
     return Minimum(x, at, information, rounds, False)
 
 
-def _step_within(low: Array, high: Array, downhill: Array, information: Array, free: npt.NDArray[np.bool_],
+def _step_within(low: Array, high: Array, downhill: Array, information: Array, free: Bools,
                  damping: float, longest: float) -> Array:
     """The damped step (k,) of the numbers that are free to move, within bounds on it (k,): where a number would go
     beyond one it goes up to there, and the others go where they are best then."""
@@ -125,7 +124,7 @@ def _step_within(low: Array, high: Array, downhill: Array, information: Array, f
         free &= ~beyond
 
 
-def _step(downhill: Array, information: Array, free: npt.NDArray[np.bool_], damping: float, longest: float) -> Array:
+def _step(downhill: Array, information: Array, free: Bools, damping: float, longest: float) -> Array:
     """The damped step (k,) of the numbers that are free to move."""
     step = np.zeros_like(downhill)
     size = np.diag(information)[free]

@@ -21,6 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array, Bools
 from logger.fleet.car_biases import CarBiases, RoadPasses, car_biases
 from logger.fleet.dataset import Engine
 from logger.fleet.road_map import ON_MAP, SEGMENT_M, RoadPieces, block_of, cell_keys, section_of
@@ -98,9 +99,6 @@ def history(rows: ir.Table, gains: ir.Table, since_us: int | None, until_us: int
     return passes.group_by(["road", "quarter"]).aggregate(
         passes=passes.count(), iri=(passes.pass_iri_m_per_km / passes.gain).sum())
 
-
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,7 +249,7 @@ class RoadTable:
     a_w_mps2: Array
     speed_mps: Array
     last_us: Keys
-    worse: npt.NDArray[np.bool_]
+    worse: Bools
     visit: npt.NDArray[np.str_]
 
     @property

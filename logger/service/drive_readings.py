@@ -18,10 +18,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
 from drivers.accelerometers.accelerometer import OtherSettings
 from drivers.readings import AccelerationBlock, Fix
+from logger.arrays import Array, Bools
 from logger.dsp.windows import GridSamples, joined
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.records import WindowRecord
@@ -85,8 +85,6 @@ class RangeUse:
         return setting and f"{why}: set {setting}"
 
 
-Array = npt.NDArray[np.float64]
-
 _JUDGED_AFTER_US = 120 * US_PER_S
 """A sensor that is frozen or repeats itself is known to be after half a minute, a wrong speed after one or two."""
 
@@ -103,8 +101,8 @@ class GridReadings:
 
     time_s: Array
     accel_mps2: Array
-    present: npt.NDArray[np.bool_]
-    clipped: npt.NDArray[np.bool_]
+    present: Bools
+    clipped: Bools
 
 
 class DriveReadings(JudgedDrive):

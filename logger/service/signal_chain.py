@@ -23,6 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.readings import AccelerationBlock
+from logger.arrays import Array, Bools, Complex
 from logger.comfort.iso2631 import RunningRms, comfort_word
 from logger.comfort.uncertain_ride import NO_FIGURES, NoiseFloor, RawFigures, RideFigures, Uncertain
 from logger.dsp.filters import BlockFilter, SectionRows, butterworth_sos, frequency_response
@@ -42,9 +43,6 @@ LINE_OVER_HOLE_US = 500_000
 SILENCE_US = 2_000_000
 START_MEAN_SAMPLES = 50
 NEARLY = 1.02  # So much faster than the grid a sensor may be without a filter: what folds lies above 48 Hz
-Floats = npt.NDArray[np.float64]
-ComplexFloats = npt.NDArray[np.complex128]
-Bools = npt.NDArray[np.bool_]
 Times = npt.NDArray[np.int64]
 
 
@@ -214,8 +212,8 @@ class SignalChain:
         own = each, np.isfinite(each), np.where(each_clipped, np.sign(each), 0.0)
         return self._filter(t_us, run.values, reading, everywhere, run.bridged, run.clipped, own)
 
-    def _filter(self, t_us: Times, values: Floats, reading: Floats, present: Bools, interpolated: Bools, clipped: Bools,
-                own: tuple[Floats, Bools, Floats]) -> list[GridSamples]:
+    def _filter(self, t_us: Times, values: Array, reading: Array, present: Bools, interpolated: Bools, clipped: Bools,
+                own: tuple[Array, Bools, Array]) -> list[GridSamples]:
         """Run the filters over more samples. The weighting is some whole samples behind; as many wait for it, and its
         first outputs belong to instants before the start."""
         self._next_us = int(t_us[-1]) + GRID_STEP_US
@@ -244,7 +242,7 @@ class SignalChain:
         weighted = self._weighting.process(np.full(self._early + len(waiting), self._last_mps2))
         return self._weighed(waiting, weighted[self._early :])
 
-    def _weighed(self, samples: GridSamples, weighted_mps2: Floats) -> list[GridSamples]:
+    def _weighed(self, samples: GridSamples, weighted_mps2: Array) -> list[GridSamples]:
         if not len(samples):
             return []
         running = self._running.process(weighted_mps2)
@@ -256,18 +254,18 @@ def _grid_us(begin_us: int, end_us: int) -> Times:
     return np.arange(begin_us, end_us - GRID_STEP_US // 2, GRID_STEP_US, dtype=np.int64)
 
 
-def _unread(count: int, reads: int) -> tuple[Floats, Bools, Floats]:
+def _unread(count: int, reads: int) -> tuple[Array, Bools, Array]:
     """Of samples none of whose readings came: what ``GridSamples`` has of each."""
     return np.zeros((count, reads)), np.zeros((count, reads), dtype=np.bool_), np.zeros((count, reads))
 
 
-def recorder_gain(low_pass_hz: float | None) -> Callable[[Floats], Floats]:
+def recorder_gain(low_pass_hz: float | None) -> Callable[[Array], Array]:
     """What the chain does to a body acceleration before its r.m.s. is taken: gain at frequencies (n,) [Hz]."""
     filters = [butterworth_sos("high", GRAVITY_CORNER_HZ, GRID_RATE_HZ)]
     if low_pass_hz:
         filters.append(butterworth_sos("low", low_pass_hz, GRID_RATE_HZ))
 
-    def gain(f_hz: Floats) -> Floats:
+    def gain(f_hz: Array) -> Array:
         seen = f_hz < GRID_RATE_HZ / 2
         below_hz = np.where(seen, f_hz, 0.0)
         total = np.where(seen, 1.0, 0.0)
@@ -278,10 +276,10 @@ def recorder_gain(low_pass_hz: float | None) -> Callable[[Floats], Floats]:
     return gain
 
 
-def weighted_response(weighting: Weighting, low_pass_hz: float | None) -> Callable[[Floats], ComplexFloats]:
+def weighted_response(weighting: Weighting, low_pass_hz: float | None) -> Callable[[Array], Complex]:
     """What the chain makes of a body acceleration on its way to the comfort figures: complex response at frequencies
     (n,) from 0 to half the grid's rate [Hz], without the sections' delay."""
-    def response(f_hz: Floats) -> ComplexFloats:
+    def response(f_hz: Array) -> Complex:
         total = weighting.response(f_hz)
         if low_pass_hz:
             total = total * frequency_response(butterworth_sos("low", low_pass_hz, GRID_RATE_HZ), f_hz, GRID_RATE_HZ)

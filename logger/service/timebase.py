@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.readings import Fix
+from logger.arrays import Array, Bools
 from logger.geodesy import ground_distance_m
 from logger.units import US_PER_S
 
@@ -215,8 +216,6 @@ ACCELERATION_LIMIT_MPS2 = 15.0
 PLACE_JUMP_M = 80.0
 REJECTED_IN_A_ROW = 3
 
-Floats = npt.NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class Travel:
@@ -226,10 +225,10 @@ class Travel:
     bridged         known only by bridging a loss of fix
     """
 
-    distance_m: Floats
-    speed_mps: Floats
-    known: npt.NDArray[np.bool_]
-    bridged: npt.NDArray[np.bool_]
+    distance_m: Array
+    speed_mps: Array
+    known: Bools
+    bridged: Bools
     leg: npt.NDArray[np.int64]
 
 

@@ -20,8 +20,8 @@ from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.comfort.iso2631 import COMFORT_WORDS, comfort_word
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.dsp.whole_record import in_band
@@ -48,7 +48,6 @@ from logger.vehicle.named_parameters import free
 from logger.vehicle.simulate import Passage
 from logger.vehicle.vehicle import Vehicle
 
-Array = npt.NDArray[np.float64]
 Shape = Callable[[Array], Array]
 
 RATE_HZ = 100

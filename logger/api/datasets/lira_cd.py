@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from logger.api import road_sets
+from logger.arrays import Array
 from logger.errors import BadInput
 from logger.extraction.along_track import ASIDE_M, MeasuredLine
 from logger.files import read_bounded
@@ -29,8 +29,6 @@ from logger.store.formats.record_file import MAX_BYTES
 from logger.store.formats.vehicle_file import read_model
 from logger.studies.study import Item, Picture, Result, Study, Table, Word, Workload
 from logger.units import KMH_MPS
-
-Array = npt.NDArray[np.float64]
 
 _CAR = "sedan-2015"
 _CELL_M, _PLACE_EVERY_M = 10.0, 5.0

@@ -13,16 +13,14 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 import numpy as np
-import numpy.typing as npt
 
 from logger.api import road_sets
+from logger.arrays import Array
 from logger.errors import BadInput
 from logger.geodesy import EARTH_RADIUS_M
 from logger.store.formats.drive_file import write_table
 from logger.store.formats.mat_file import read_arrays, read_geopoint
 from logger.studies.study import Item, Picture, Result, Study, Word, Workload
-
-Array = npt.NDArray[np.float64]
 
 _CAR = "sedan-2015"
 _BOTH = "road_elevation_NB_SB.mat"

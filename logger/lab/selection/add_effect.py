@@ -13,9 +13,6 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-import numpy.typing as npt
-
 from logger.lab.likelihood.by_squares import BySquares
 from logger.lab.likelihood.distance_error import zero_of
 from logger.lab.likelihood.linear_model import LinearModel
@@ -34,8 +31,6 @@ from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.named_parameters import read
 from logger.vehicle.uncertain import NumberErrors
 from logger.vehicle.vehicle import Vehicle
-
-Array = npt.NDArray[np.float64]
 
 BIAS_SIGMA = 2.0
 """A number that an effect moves by more standard errors than this had been biased by its absence."""

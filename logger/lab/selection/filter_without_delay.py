@@ -12,8 +12,8 @@ from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Complex
 from logger.dsp.filters import butterworth
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.record_band import cut_to_pass_band, is_steep, is_wide_enough
@@ -25,8 +25,6 @@ from logger.runs import LowPass
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.effect import Misalignment
 from logger.vehicle.effects.sensor_bandwidth import SensorBandwidth
-
-Complex = npt.NDArray[np.complex128]
 
 _IMITATED_BY = "sensor_bandwidth"
 

@@ -17,13 +17,12 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import own_slopes
 from logger.lab.likelihood.readings import error_with_rounding_noise
 from logger.lab.likelihood.signals import deviance
 from logger.runs import Run
-
-Array = npt.NDArray[np.float64]
 
 JUDGED_ON = "held-out stretches"
 """What the errors of steps and candidates are errors of."""

@@ -14,8 +14,8 @@ from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align
 from logger.lab.likelihood.noise_floor import excess_over_noise, gain_of_full_explanation
@@ -27,8 +27,6 @@ from logger.runs import Run, are_on_rig
 from logger.vehicle.effect import AXLE, Chosen, Effect, Misalignment, Scale, SensorEffect, chosen
 from logger.vehicle.effects.time_offset import EFFECT as TIME_OFFSET
 from logger.vehicle.named_parameters import FreeParameter, coordinates_of, read, with_coordinates
-
-Array = npt.NDArray[np.float64]
 
 # Bounds of the best strength over that of a trial, as far as a quadratic is to be believed (judgements). An effect that
 # shifts all of a run is linear much farther, and is tried with next to nothing.

@@ -17,7 +17,6 @@ from typing import Any
 from zlib import crc32
 
 import numpy as np
-import numpy.typing as npt
 
 from logger.lab.likelihood.by_squares import BySquares
 from logger.lab.likelihood.linear_model import LinearModel
@@ -30,8 +29,6 @@ from logger.lab.selection.screening import Baseline, Screened, effects_without
 from logger.lab.selection.stepwise import MeasuredRoad, Progress
 from logger.vehicle.effect import Chosen, Effect, Misalignment, chosen
 from logger.vehicle.named_parameters import WEAKEST
-
-Array = npt.NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Complex
 from logger.fitting.fisher_scoring import maximise
 from logger.fitting.information_matrix import inverse
 from logger.identification.unknown_road.marginal_likelihood import RoadsScore
@@ -22,9 +22,6 @@ from logger.vehicle.named_parameters import (
     steps_of,
     with_coordinates,
 )
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 
 @dataclass(frozen=True, eq=False)

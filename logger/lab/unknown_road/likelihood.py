@@ -24,8 +24,8 @@ from functools import partial
 from itertools import pairwise, permutations
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array, Complex
 from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM
 from logger.identification.unknown_road.marginal_likelihood import (
     OFFSET,
@@ -51,9 +51,6 @@ from logger.vehicle.named_parameters import Free
 from logger.vehicle.simulate import recorder_gain
 from logger.vehicle.structure import Output
 from logger.vehicle.vehicle import Vehicle
-
-Array = npt.NDArray[np.float64]
-Complex = npt.NDArray[np.complex128]
 
 _STEP_HZ = 0.025
 """Step of the table: eight are as wide as a resonance at 1 Hz with a damping ratio of 0.1."""

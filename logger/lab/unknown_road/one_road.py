@@ -23,8 +23,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.lab.likelihood.lag import lags
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.unknown_road.likelihood import RoadFitState, SameRoad
@@ -32,8 +32,6 @@ from logger.runs import Run
 from logger.vehicle.effect import Chosen
 from logger.vehicle.simulate import PASS_OF_RATE
 from logger.vehicle.vehicle import Vehicle
-
-Array = npt.NDArray[np.float64]
 
 AGREEMENT_SIGMA = 5.0
 """Standard deviations of chance from which on two drives are over one road: a p-value of 3e-7, and some hundred lags

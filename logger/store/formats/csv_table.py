@@ -24,13 +24,12 @@ from functools import partial
 from math import isfinite, nan
 
 import numpy as np
-import numpy.typing as npt
 
 from drivers.errors import shortened
+from logger.arrays import Array
 from logger.bounds import Quantity
 from logger.errors import BadInput
 
-Array = npt.NDArray[np.float64]
 Names = tuple[str, ...]
 
 LINE_BYTES = 64 * 1024

@@ -18,10 +18,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import yaml
 
 from logger import bounds
+from logger.arrays import Array
 from logger.errors import BadInput
 from logger.files import file_in, read_bounded, write_text
 from logger.profiles.excitation import FEWEST, AppliedForce, Excitation
@@ -198,8 +198,6 @@ def _some(facts: RecordFacts, names: tuple[str, ...]) -> Mapping[str, float]:
     known = {one.name: getattr(facts, one.name) for one in fields(facts)}
     return {name: float(f"{known[name]:.6g}") for name in names if known[name] is not None}
 
-
-Array = npt.NDArray[np.float64]
 
 DRIVE, PROFILE, EXCITATION = DRIVE_NAME, PROFILE_NAME, "excitation.csv"
 SPEED, DISTANCE = "speed_mps", "distance_m"

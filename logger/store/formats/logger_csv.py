@@ -9,8 +9,8 @@ from pathlib import Path
 from types import MappingProxyType
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.bounds import TIME
 from logger.errors import BadInput
 from logger.files import read_bounded
@@ -115,8 +115,6 @@ LAYOUTS = (
       for speed in ("speed_mps|m/s", "speed_kmh|km/h", "speed_mph|mph")),
 )
 
-
-Array = npt.NDArray[np.float64]
 
 Named = Mapping[str, tuple[LayoutColumn, ...]]
 """Columns by role as a user names them: the header of each file has one of them at most."""

@@ -18,13 +18,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.errors import BadInput
 from logger.files import read_bounded
 from logger.printable import printable
-
-Array = npt.NDArray[np.float64]
 
 _MOST_BYTES = 1 << 28
 _ORDERS = {b"IM": "<", b"MI": ">"}

@@ -39,8 +39,8 @@ from math import isfinite, nan
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.bounds import DISTANCE, ELEVATION, FORCE, MOST_SAMPLES
 from logger.errors import BadInput
 from logger.files import file_in, read_bounded
@@ -58,8 +58,6 @@ from logger.store.formats.csv_table import (
 )
 from logger.store.formats.record_file import MAX_BYTES, TIME, laid_evenly
 from logger.units import FOOT_M
-
-Array = npt.NDArray[np.float64]
 
 MAX_CHANNELS = 1000
 MAX_HEADER_LINES = 10_000

@@ -18,9 +18,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from drivers.readings import STANDARD_GRAVITY_MPS2
+from logger.arrays import Array, Bools
 from logger.bounds import SIGNAL
 from logger.dsp import repeated_samples
 from logger.errors import BadInput
@@ -31,9 +31,6 @@ from logger.runs import CLIPPED, NO_READING
 from logger.store.formats.csv_table import parse_columns, place, taken
 from logger.store.formats.drive_file import DISTANCE, DRIVE, PLACE, SPEED, USABLE, header_of
 from logger.store.formats.record_file import HOLE_STEPS, MAX_BYTES, TIME, VERTICAL, check_grows, even_rate_hz
-
-Array = npt.NDArray[np.float64]
-Bools = npt.NDArray[np.bool_]
 
 UNITS = ("mps2", "g")
 OWN_RATE = 0.0

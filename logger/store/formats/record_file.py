@@ -11,14 +11,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import numpy.typing as npt
 
 from logger import bounds
+from logger.arrays import Array
 from logger.errors import BadInput
 from logger.files import file_in, read_bounded
 from logger.store.formats.csv_table import parse_columns, place, taken
-
-Array = npt.NDArray[np.float64]
 
 DRIVE_NAME = "drive.csv"
 TIME = "t_s"

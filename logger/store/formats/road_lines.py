@@ -12,16 +12,14 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.bounds import DISTANCE
 from logger.errors import BadInput
 from logger.files import read_bounded
 
 MAX_BYTES = 256 << 20
 """A county's roads; a country's would not be read in a minute, and the page keeps only what is near."""
-
-Array = npt.NDArray[np.float64]
 
 
 def read_geojson(path: Path | str) -> dict[str, Any]:

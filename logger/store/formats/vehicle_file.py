@@ -23,9 +23,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 import yaml
 
+from logger.arrays import Array
 from logger.errors import BadInput
 from logger.estimation.rms_calibration import METHOD, CalibrationSettings, RmsLine, SpeedCalibration
 from logger.files import json_sha256, make_folder, read_bounded, replace_bytes, write_text
@@ -499,8 +499,6 @@ def _number(value: float) -> float:
     plain = float(value)
     return int(plain) if plain.is_integer() else plain
 
-
-Array = npt.NDArray[np.float64]
 
 FORMAT = 1
 KEPT = 16  # the oldest goes first
