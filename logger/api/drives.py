@@ -22,6 +22,7 @@ from logger.api.roads import Profile, read_profile, write_profile
 from logger.api.shown import CommandResult, Shown, checks_json, checks_lines, table
 from logger.api.vehicles import model_of
 from logger.chart_data import Array, Chart, Curves, Line, line
+from logger.dsp.channel_faults import released_at
 from logger.errors import BadInput
 from logger.estimation.batch import (
     MIX_IRI,
@@ -38,7 +39,7 @@ from logger.estimation.sensor_noise import NOISE_MPS2, Sensor
 from logger.files import make_folder, together, write_text
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
-from logger.runs import SKIP_S, UNKNOWN
+from logger.runs import SKIP_S, UNKNOWN, begins_freely
 from logger.runs import Run as Record
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats import drive_file, vehicle_file
@@ -108,8 +109,9 @@ def read_run(path: Path | str) -> Run:
                excitation=drive_file.excitation_beside(drive) if timed else None)
 
 
-def run_on_road(given: Run | Path | str) -> Run:
-    """A run, or its folder, with the road that it was driven on, or its excitation. BadInput for one without."""
+def run_on_road(given: Run | Path | str, notify: Notify = silent) -> Run:
+    """A run, or its folder, with the road that it was driven on, or its excitation; a free decay from where it is let
+    go. BadInput for one without."""
     if not isinstance(given, Run) and not Path(given).is_dir():
         raise BadInput(f"{given}: expected a folder with {drive_file.DRIVE} and {drive_file.PROFILE} (or "
                        f"{drive_file.EXCITATION})")
@@ -117,7 +119,19 @@ def run_on_road(given: Run | Path | str) -> Run:
     if run.track is None:
         raise BadInput(f"{run.path}: expected a run with the profile that it was driven on, or its excitation "
                        f"({drive_file.PROFILE} or {drive_file.EXCITATION})")
-    return run
+    return _let_go(run, notify) if begins_freely(run.track) else run
+
+
+def _let_go(run: Run, notify: Notify) -> Run:
+    """A free decay without the time in which it was held still before."""
+    first = released_at(run.accel_z_mps2)
+    if not first:
+        return run
+    later_s = first / run.rate_hz
+    notify(f"{run.path}: held still for its first {later_s:.3g} s: used from where it begins to move")
+    columns: dict[str, Any] = {name: one[first:] for name, one in vars(run).items() if isinstance(one, np.ndarray)}
+    return replace(run, **columns, more={name: one[first:] for name, one in run.more.items()},
+                   excitation=run.excitation and run.excitation.begun(later_s))
 
 
 def _file_of(place: Path) -> Path:

@@ -1,4 +1,5 @@
-"""What is wrong with a channel of a rig: an amplifier that was at its end, a cable that was out, a sign.
+"""What is wrong with a channel of a rig: an amplifier that was at its end, a cable that was out, a sign, a trigger that
+came before what was to be recorded.
 
 Problem: such records fit no car, and whatever effect imitates the fault best is named. Solution: an amplifier at its
 end and a cable that is out give one number again and again, and come to it in a leap, where what turns round comes
@@ -17,6 +18,7 @@ from logger.dsp.repeated_samples import stretches_of
 # curve that turns round within five samples and is rounded it is one.
 _EQUAL, _LEAP_STEPS = 5, 2.5
 _STILL_S = 0.1
+_STEADY = 0.05  # of how far it goes then: by how much what is held moves at the most (a judgement)
 # Of a force's power, what mass, damper and spring explain, and of that, what negative ones do. Measured on 40 rigs with
 # effects of all kinds, also with masses that no spring holds: 0.1 to 1, and 0 to 0.45; of forces turned round 1.
 _FOLLOWS, _AGAINST = 0.3, 0.9
@@ -60,6 +62,29 @@ def goes_against(force_n: Array, motion: Array, measured: int, orders: range, ra
     parts = columns * by
     follows = 1 - np.sum((force - parts.sum(axis=1)) ** 2) / max(np.sum(force**2), 1e-300)
     return bool(follows > _FOLLOWS and np.sum(parts[:, by < 0] ** 2) > _AGAINST * np.sum(parts**2))
+
+
+def released_at(samples: Array) -> int:
+    """The first of the samples (n,) of a free decay after it was held still; 0 where it was not. What is let go is half
+    way of its farthest a quarter of a period later, or at once: up to there, what is held has a variance and what moves
+    a larger one (maximum likelihood of one change, which Schwarz's criterion asks for), and what was held was so for
+    longer than that lasts, and the rest of the way to the farthest, and stood still by what moves."""
+    away = samples - samples[0]
+    farthest = float(np.abs(away).max())
+    half_way = int(np.argmax(np.abs(away) >= 0.5 * farthest))
+    firsts = np.arange(_EQUAL, half_way + 1)
+    if not len(firsts):
+        return 0
+    sums, squares = (np.concatenate([[0.0], np.cumsum(one[:half_way])]) for one in (away, away**2))
+    levels, rest = sums[firsts] / firsts, half_way - firsts
+    held = np.maximum(squares[firsts] / firsts - levels**2, (_STEADY**2 * farthest) ** 2)  # it may be all one number
+    moving = squares[half_way] - squares[firsts] - 2 * levels * (sums[half_way] - sums[firsts]) + rest * levels**2
+    moving = np.maximum(np.divide(moving, rest, out=held.copy(), where=rest > 0), held)
+    cost = firsts * np.log(held) + rest * np.log(moving) + 2 * np.log(half_way) * (rest > 0)
+    best = int(np.argmin(cost))
+    first = int(firsts[best])
+    swings = max(half_way - first, int(np.argmax(np.abs(away))) - half_way)
+    return first if first > swings and held[best] < (_STEADY * farthest) ** 2 else 0
 
 
 def _is_leapt_to(samples: Array, at: Bools) -> bool:

@@ -135,15 +135,17 @@ class SimulatedRuns:
         return len(self.runs)
 
     def predict(self, car: Car, distance_error_m: Sequence[Array] | None = None, rough: bool = False,
-                tracks: Sequence[WheelTracks] | None = None) -> list[Array]:
+                tracks: Sequence[WheelTracks] | None = None, near: Sequence[Beginning | None] | None = None
+                ) -> list[Array]:
         """Predicted record of each run, whole, in its pass band (n,) [m/s2]; of one with more signals all ((1 + s) n,).
 
         distance_error_m    distance driven minus distance recorded (n,), per run; None: 0
         rough               no finer steps for a car with dry friction: near enough for differences
         tracks              roads in place of the runs' own; each such object is cached by itself
+        near                how runs that begin freely begin with a car that hardly differs (``beginnings``)
         """
         with np.errstate(over="ignore", invalid="ignore"):
-            passages = self._passages_of(car, distance_error_m, rough, tracks)
+            passages = self._passages_of(car, distance_error_m, rough, tracks, near)
             steps = car.bends_laws or car.structure.held
             for step_s, forces in {(one.step_s, one.forces) for one in passages if steps}:
                 stepper_of(car, step_s, forces)  # made once, before both threads ask for it
@@ -157,8 +159,22 @@ class SimulatedRuns:
         with np.errstate(over="ignore", invalid="ignore"):
             return [respond(car, passage) for passage in self._passages_of(car, distance_error_m)]
 
+    def beginnings(self, car: Car, distance_error_m: Sequence[Array] | None = None, rough: bool = False
+                   ) -> list[Beginning | None]:
+        """How the runs that begin freely begin with this car; None of the others."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            return [_beginning(car, passage, run) if run.begins_freely else None for run, passage in zip(
+                self.runs, self._unbegun(car, distance_error_m, rough), strict=True)]
+
     def _passages_of(self, car: Car, distance_error_m: Sequence[Array] | None, rough: bool = False,
-                     tracks: Sequence[WheelTracks] | None = None) -> list[Passage]:
+                     tracks: Sequence[WheelTracks] | None = None, near: Sequence[Beginning | None] | None = None
+                     ) -> list[Passage]:
+        passages = self._unbegun(car, distance_error_m, rough, tracks)
+        return [passage.begun_with(_beginning(car, passage, run, one).state) if run.begins_freely else passage
+                for run, passage, one in zip(self.runs, passages, near or [None] * len(passages), strict=True)]
+
+    def _unbegun(self, car: Car, distance_error_m: Sequence[Array] | None, rough: bool,
+                 tracks: Sequence[WheelTracks] | None = None) -> list[Passage]:
         fine_hz = _FINER_WITH_FRICTION * self.fine_hz if car.rubs and not rough else self.fine_hz
         found = []
         for index, run in enumerate(self.runs):
@@ -171,8 +187,16 @@ class SimulatedRuns:
                 passage = Passage(track, run.rate_hz, distance, fine_hz, index, run.begins_freely)
                 kept = [*self._passages[index].items()][-_KEPT_PASSAGES + 1 :]
                 self._passages[index] = dict(kept) | {key: passage}
-            found.append(_begun(car, passage, run) if run.begins_freely else passage)
+            found.append(passage)
         return found
+
+
+@dataclass(frozen=True, eq=False)
+class Beginning:
+    """The state (2 n,) in which a run begins, and how what its signals record changes with it (m, 2 n)."""
+
+    state: Array
+    columns: Array
 
 
 _STATE_STEP, _MOST_STATE_STEPS = 1e-3, 12
@@ -180,8 +204,9 @@ _STATE_CLOSE = 1e-3  # the last step: what is left after it is of the size of it
 _UNSEEN, _SMALL_STATE = 1e-4, 1e-6
 
 
-def _begun(car: Car, passage: Passage, run: Run) -> Passage:
-    """The passage begun in the state with which the car's records come nearest to what the run measured.
+def _beginning(car: Car, passage: Passage, run: Run, near: Beginning | None = None) -> Beginning:
+    """The state with which the car's records come nearest to what the run measured; one step of Gauss and Newton away
+    from that of a car that hardly differs (``near``), where there is one.
 
     Problem: what is pulled and let go, or was struck before its record begins, is in a state that nobody wrote down,
     and every number of the car that is tried has its own best one. Solution: the state is eliminated wherever the run
@@ -190,36 +215,20 @@ def _begun(car: Car, passage: Passage, run: Run) -> Passage:
     a car whose laws are bent. Each signal counts by its own size, and its zero is free. What the record does not show
     of the state stays at rest.
     """
-    signals, main = run.signals, run.facts.main
-    read = (run.read if run.usable is None else run.usable == READING) & (np.arange(run.count) >= run.first)
-    measured = np.stack([run.measured_mps2, *run.more])[:, read]
-    sizes = measured.std(axis=1, keepdims=True)
-    sizes[sizes == 0] = 1.0
-
-    def weighed(samples: Array) -> Array:
-        return np.asarray((samples - samples.mean(axis=1, keepdims=True)) / sizes).ravel()
-
-    def record(of: Car, begun: Passage) -> Array:
-        joined = run.in_band(_recorded(of, begun, signals, main))
-        return weighed(joined.reshape(-1, run.count)[:, read])
-
+    weighed = _WeighedRecord(run)
+    record, step, wanted, plain = weighed.of, weighed.step, weighed.measured, car.linear
     passage.under_wheels(passage.driven(car.structure))  # asked for once, for all states
-    wanted, plain = weighed(measured), car.linear
+    if near is not None:
+        left = wanted - record(car, passage.begun_with(near.state))
+        return replace(near, state=near.state + step(near.columns, left))
     still = record(plain, passage)
     # Small, as records are clipped at what no sensor reads: 1 m is that of what is let go at 160 Hz.
     small = passage.begun_in_each(_SMALL_STATE * np.eye(2 * len(car.structure.mass)))
     columns = np.stack([record(plain, one) - still for one in small], axis=1) / _SMALL_STATE
-    seen = np.linalg.norm(columns, axis=0)
-    usual = np.divide(np.linalg.norm(wanted), seen, out=np.zeros_like(seen), where=seen > 0)
-
-    def step(columns: Array, left: Array) -> Array:
-        return np.asarray(usual * np.linalg.lstsq(columns * usual, left, rcond=_UNSEEN)[0])
-
-    state = step(columns, wanted - still)
-    best = passage.begun_with(state)
+    usual, state = weighed.usual(columns), step(columns, wanted - still)
     if not car.bends_laws:
-        return best
-    here = record(car, best)
+        return Beginning(state, columns)
+    here = record(car, passage.begun_with(state))
     for _ in range(_MOST_STATE_STEPS):
         for index, one in enumerate(_STATE_STEP * usual):
             if one > 0:
@@ -227,16 +236,46 @@ def _begun(car: Car, passage: Passage, run: Run) -> Passage:
                 columns[:, index] = (record(car, beside) - here) / one
         way, least = step(columns, wanted - here), float(np.sum((wanted - here) ** 2))
         for share in (1.0, 0.5, 0.25, 0.1, 0.02):
-            begun = passage.begun_with(state + share * way)
-            there = record(car, begun)
+            there = record(car, passage.begun_with(state + share * way))
             if np.sum((wanted - there) ** 2) < least:
                 break
         else:
             break
-        state, best, here = state + share * way, begun, there
+        state, here = state + share * way, there
         if (np.abs(share * way) <= _STATE_CLOSE * usual).all():
             break
-    return best
+    return Beginning(state, columns)
+
+
+class _WeighedRecord:
+    """What a run's signals read, joined (m,): each without its mean, by its own size."""
+
+    def __init__(self, run: Run) -> None:
+        self._run = run
+        read = run.read if run.usable is None else run.usable == READING
+        self._counted = read & (np.arange(run.count) >= run.first)
+        measured = np.stack([run.measured_mps2, *run.more])[:, self._counted]
+        self._sizes = measured.std(axis=1, keepdims=True)
+        self._sizes[self._sizes == 0] = 1.0
+        self.measured = self._weighed(measured)
+
+    def of(self, car: Car, begun: Passage) -> Array:
+        """What a car would have read in their place."""
+        joined = self._run.in_band(_recorded(car, begun, self._run.signals, self._run.facts.main))
+        return self._weighed(joined.reshape(-1, self._run.count)[:, self._counted])
+
+    def usual(self, columns: Array) -> Array:
+        """Sizes (2 n,) of a state whose columns (m, 2 n) are as large as what was measured."""
+        seen = np.linalg.norm(columns, axis=0)
+        return np.divide(np.linalg.norm(self.measured), seen, out=np.zeros_like(seen), where=seen > 0)
+
+    def step(self, columns: Array, left: Array) -> Array:
+        """The change of the state (2 n,) that makes up for what is left (m,)."""
+        usual = self.usual(columns)
+        return np.asarray(usual * np.linalg.lstsq(columns * usual, left, rcond=_UNSEEN)[0])
+
+    def _weighed(self, samples: Array) -> Array:
+        return np.asarray((samples - samples.mean(axis=1, keepdims=True)) / self._sizes).ravel()
 
 
 def _recorded(car: Car, passage: Passage, signals: tuple[Signal, ...], main: Signal) -> Array:

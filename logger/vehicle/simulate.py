@@ -101,8 +101,10 @@ class Passage:
         self.count = len(distance_m)
         self.steps = max(1, int(np.ceil(fine_hz / rate_hz - _EVEN)))
         self.step_s = 1 / (rate_hz * self.steps)
-        self._lead, self._tail = round(APPROACH_S * rate_hz), round(_TAIL_S * rate_hz)
+        self._lead = min(round(APPROACH_S * rate_hz), self.count) if is_free else round(APPROACH_S * rate_hz)
         self._mirrored = self._lead if is_free else 0
+        # What nothing drives is not early against anything.
+        self._tail = max(round((_TAIL_S - APPROACH_S * is_free) * rate_hz), len(recorder_taps(1)) // 2 + 1)
         before = self._lead - self._mirrored
         pace_m, ahead_m = distance_m[1] - distance_m[0], distance_m[-1] - distance_m[-2]
         way = np.concatenate([distance_m[0] + pace_m * np.arange(-before, 0), distance_m,

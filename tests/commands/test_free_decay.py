@@ -17,12 +17,14 @@ VEHICLE = f"name: mass\nmodel: single_mass\nmass_kg: {M} +- 1%\nstiffness_n_per_
 
 
 def decay(place: Path, lasts_s: float = 3.0, friction_n: float = 0.0, step_m: float = 0.0005, from_m: float = -0.07,
-          seed: int = 3) -> Path:
-    """A run with a record of a mass from 7 cm below its rest, read in steps [m]."""
+          seed: int = 3, held: int = 0) -> Path:
+    """A run with a record of a mass from 7 cm below its rest, held there for so many samples, read in steps [m]."""
     time_s = np.arange(0, lasts_s, 0.01)
     state = solve_ivp(lambda _t, s: [s[1], -(K * s[0] + C * s[1] + friction_n * np.tanh(s[1] / 1e-3)) / M],
                       (0, lasts_s), [from_m, 0.0], t_eval=time_s, rtol=1e-8, atol=1e-10, max_step=2e-3).y
     noisy = state[0] + np.random.default_rng(seed).normal(0, 2e-4, len(time_s))
+    before = from_m + np.random.default_rng(seed + 1).normal(0, 2e-4, held)
+    noisy, time_s = np.concatenate([before, noisy]), np.arange(held + len(noisy)) / 100
     place.mkdir()
     rows = zip(time_s, step_m * np.round(noisy / step_m), strict=True)
     (place / "drive.csv").write_text("t_s,displacement_m\n" + "".join(f"{t:.2f},{x:.6f}\n" for t, x in rows))
@@ -43,6 +45,14 @@ def test_spring_and_damper_are_found_from_a_record_alone(tmp_path: Path) -> None
     again = json.loads(called("identify", "--json", "--vehicle", tmp_path / "vehicle.yaml", "--free",
                               "stiffness_n_per_m,damping_n_s_per_m", run.parent).stdout)
     assert again["parameters"] == pytest.approx(answer["parameters"])
+
+
+def test_what_was_held_before_is_cut_off_and_said(tmp_path: Path) -> None:
+    decay(tmp_path / "run"), decay(tmp_path / "held", held=150)
+    asked = "--vehicle", tmp_path / "vehicle.yaml", "--free", "stiffness_n_per_m,damping_n_s_per_m", "--json"
+    found, held = (called("identify", *asked, tmp_path / run) for run in ("run", "held"))
+    assert json.loads(held.stdout)["parameters"] == pytest.approx(json.loads(found.stdout)["parameters"], rel=5e-3)
+    assert "held still for its first 1.5" in held.stderr and "held still" not in found.stderr
 
 
 def test_nothing_is_left_out_and_nothing_is_missing(tmp_path: Path) -> None:

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.signal import StateSpace, lsim
 
-from logger.dsp.channel_faults import goes_against, longest_still, share_at_ends
+from logger.dsp.channel_faults import goes_against, longest_still, released_at, share_at_ends
 
 RATE_HZ = 200.0
 TIME_S = np.arange(4000) / RATE_HZ
@@ -40,3 +40,20 @@ def test_a_force_of_the_wrong_sign_is_found_whatever_is_measured(measured: int) 
     motion = [place, states[:, 1], push - 400 * place - 2 * states[:, 1]][measured]
     assert not goes_against(push, motion, measured, range(3), RATE_HZ)
     assert goes_against(-push, motion, measured, range(3), RATE_HZ)
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.003, 0.02])
+@pytest.mark.parametrize("order", range(3))
+def test_what_is_held_is_found_and_what_swings_is_not_held(order: int, noise: float) -> None:
+    """A mass at 3 Hz with a damping ratio of 5 %, let go at rest or recorded from any moment on; its derivatives."""
+    root = 6 * np.pi * (-0.05 + 1j)
+    time_s, rng = np.arange(600) / RATE_HZ, np.random.default_rng(order)
+
+    def swings(turn: float) -> np.ndarray:
+        return np.asarray((np.exp(1j * turn) * (root / abs(root)) ** order * np.exp(root * time_s)).real)
+
+    let_go = swings(np.arctan2(-0.05, 1.0))
+    held = np.concatenate([np.full(300, let_go[0] if order == 0 else 0.0), let_go])
+    assert released_at(held + noise * rng.standard_normal(900)) == pytest.approx(300, abs=6)
+    for turn in np.linspace(0, 2 * np.pi, 20):
+        assert released_at(swings(turn) + noise * rng.standard_normal(600)) < 15

@@ -152,7 +152,8 @@ def answer(question: IdentifyQuestion) -> Identification:
     if question.road == SAME and len(given) < 2:
         raise question.wrong("same_road", ": expected two runs or more")
     flat_will_do = bool(question.obstacles) or question.road != MEASURED
-    drives = [run_on_road(one) if not flat_will_do else one if isinstance(one, Run) else read_run(one) for one in given]
+    drives = [run_on_road(one, question.warn) if not flat_will_do else one if isinstance(one, Run) else read_run(one)
+              for one in given]
     records = _records(drives, question, model.vehicle)
     if question.free is None and (question.road != MEASURED or question.obstacles):
         raise question.wrong("free", ": expected what to find, as the road was not measured")

@@ -383,12 +383,12 @@ def bench_with(question: LabQuestion, searches: str | None = None, thin: bool = 
     given: Any = question
     model = model_of(given.vehicle)
     off = tolerance_of(question.tolerance, model.known)
-    return bench_of(word_of(given.vehicle, model), model, checked_runs(lab_drives(given.runs), thin, model.vehicle),
-                    list(map(str, getattr(question, "effect_files", ()))), off, searches, question.warn,
-                    question.low_pass_hz, question.anyway)
+    runs = checked_runs(lab_drives(given.runs, question.warn), thin, model.vehicle)
+    return bench_of(word_of(given.vehicle, model), model, runs, list(map(str, getattr(question, "effect_files", ()))),
+                    off, searches, question.warn, question.low_pass_hz, question.anyway)
 
 
-def lab_drives(runs: Runs) -> list[drive_file.DriveOnRoad]:
+def lab_drives(runs: Runs, notify: Notify = silent) -> list[drive_file.DriveOnRoad]:
     """One run or several, read, with their roads. BadInput for none, for two that are one, or of one name, and for one
     without a road."""
     given = each(runs)
@@ -400,7 +400,8 @@ def lab_drives(runs: Runs) -> list[drive_file.DriveOnRoad]:
             f"{again.path if isinstance(again, DrivenRun) else again}: expected each run once, and under a name "
                        "of its own")
     return [drive_file.DriveOnRoad(**{one.name: getattr(run, one.name) for one in fields(drive_file.Drive)},
-                                   track=run.track) for run in map(run_on_road, given) if run.track is not None]
+                                   track=run.track) for run in [run_on_road(one, notify) for one in given]
+            if run.track is not None]
 
 
 def word_of(vehicle: CarModel | Path | str, model: CarModel) -> str:

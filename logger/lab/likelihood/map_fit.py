@@ -293,9 +293,10 @@ def effect_slopes(linear: LinearModel, effects: Sequence[Chosen], logs: Array, f
 
     fine    known predictions (n,) per run; a car without dry friction needs no rough ones
     """
-    posterior = linear.posterior
-    predict = partial(posterior.predict, logs=logs, record=record, rough=True)
-    before = predict(effects) if posterior.car(effects, logs).rubs else fine
+    posterior, car = linear.posterior, linear.posterior.car(effects, logs)
+    near = posterior.runs.beginnings(car, posterior.distance_error_m(record), rough=True)
+    predict = partial(posterior.predict, logs=logs, record=record, rough=True, near=near)
+    before = predict(effects) if car.rubs or any(near) else fine
     return derivatives(lambda there: predict(with_coordinates(effects, free_parameters, there)),
                        coordinates_of(effects, free_parameters), steps_of(effects, free_parameters), before)
 

@@ -15,7 +15,7 @@ from logger.lab.likelihood.readings import Readings
 from logger.lab.likelihood.signals import bands_of, deviance
 from logger.profiles.excitation import Excitation
 from logger.runs import normalised_rms_error
-from logger.simulation.virtual_drive import SimulatedRuns, steps_hz
+from logger.simulation.virtual_drive import Beginning, SimulatedRuns, steps_hz
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
@@ -115,10 +115,10 @@ class Posterior:
         """Distance driven minus distance recorded (n,) [m], per run."""
         return [one.distance_error_m(k) for one, k in zip(self.record_errors, record, strict=True)]
 
-    def predict(self, effects: Sequence[Chosen], logs: Array, record: Sequence[Array],
-                rough: bool = False) -> list[Array]:
-        """Predicted record of each run (n,)."""
-        predictions = self.runs.predict(self.car(effects, logs), self.distance_error_m(record), rough)
+    def predict(self, effects: Sequence[Chosen], logs: Array, record: Sequence[Array], rough: bool = False,
+                near: Sequence[Beginning | None] | None = None) -> list[Array]:
+        """Predicted record of each run (n,); arguments as of ``SimulatedRuns.predict``."""
+        predictions = self.runs.predict(self.car(effects, logs), self.distance_error_m(record), rough, near=near)
         return [one.with_recorder_error(prediction, k) for one, prediction, k in zip(
             self.record_errors, predictions, record, strict=True)]
 
@@ -183,8 +183,10 @@ class Posterior:
         steps (p,) of rough simulations, which are near enough."""
         error_m = self.distance_error_m(state.record)
 
+        near = self.runs.beginnings(self.car(state.effects, state.logs), error_m, rough=True)
+
         def predict(logs: Array) -> list[Array]:
-            return self.runs.predict(self.car(state.effects, logs), error_m, rough=True)
+            return self.runs.predict(self.car(state.effects, logs), error_m, rough=True, near=near)
 
         return derivatives(predict, state.logs, steps, predict(state.logs))
 
