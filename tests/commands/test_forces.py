@@ -562,6 +562,20 @@ def test_another_unit_is_said(tmp_path: Path, read: float, pushed: float, words:
         main(["compare", "--vehicle", str(tmp_path / "bench.yaml"), str(run)])
 
 
+def test_another_unit_of_another_signal_is_said(tmp_path: Path) -> None:
+    """Its spring a third too soft in the file; a gain of two is no unit."""
+    push, bench = noise(30.0, 8.0, 4), Bench(0.8, 2000.0, 6.0)
+    seen = bench.moved(NOTHING, push, NOTHING)
+    (tmp_path / "bench.yaml").write_text(bench.yaml.replace("2000.0", "1500 +- 30%"))
+    runs = [written(tmp_path / f"times-{times}", {"accel_z_mps2": seen["accel_z_mps2"],
+                                                  "displacement_m": times * seen["displacement_m"]},
+                    {"force_n": push(TIME_S)}, BODY) for times in (1000, 2)]
+    asked = ["compare", "--vehicle", str(tmp_path / "bench.yaml")]
+    with pytest.raises(BadInput, match=r"expected displacement_m in m, found \d+ times .* it looks like mm \("):
+        main([*asked, str(runs[0])])
+    assert main([*asked, str(runs[1])]) == 0
+
+
 @pytest.mark.parametrize(("damper", "refused"), [("1500 +- 20%", True), ("unknown", False)])
 def test_a_part_whose_force_is_in_kilonewtons_is_refused_if_its_damper_is_known(
         tmp_path: Path, damper: str, refused: bool) -> None:

@@ -71,6 +71,7 @@ _SIZES = {"force": (("kN", 1e-3), ("kgf", 1 / STANDARD_GRAVITY_MPS2), ("lbf", 1 
           "acceleration": tuple((unit, size) for what, unit, size in _UNITS if what == _RECORD)}
 _KINDS = {"displacement": "length", "travel": "length"}
 _APART = 2.0  # kgf and lbf are
+_NO_EFFECT = 20.0  # by so many times no effect and no resonance change all of a signal (a judgement)
 ANYWAY = "--anyway goes on"
 _NAMED = 4
 """Of the numbers of another car, so many are said."""
@@ -92,7 +93,8 @@ def check_model(word: str, model: CarModel, runs: SimulatedRuns, warn: Callable[
     followed = _followed(runs, predictions, car)
     # One after the other: whether it is the car is asked of runs that are right, and takes seconds.
     _say(chain(_other_ways_up(runs, followed), _other_units(runs, followed),
-               _other_units_on_rig(model, runs, predictions, tolerance), _other_roads(runs, followed, car),
+               _other_units_on_rig(model, runs, predictions, tolerance), _other_units_of_signals(runs, predictions),
+               _other_roads(runs, followed, car),
                _another_car(word, model, runs, predictions, known, tolerance.largest)), warn, anyway)
     return predictions
 
@@ -225,6 +227,23 @@ def _other_units_on_rig(model: CarModel, runs: SimulatedRuns, predictions: Seque
                          if abs(size / nearest - 1) < _NEAR and abs(log(gain / nearest)) < log(_APART))
     yield (f"{run.name}: expected N, m and m/s2, found {main.name} {gain:.3g} times what any rig reads that the "
            f"vehicle's file allows: " + (f"it looks like {likely}" if likely else "is a column in another unit?"))
+
+
+def _other_units_of_signals(runs: SimulatedRuns, predictions: Sequence[Array]) -> Iterator[str]:
+    """Which further signals were written in another unit, that differs by more than any missing effect makes them do.
+    """
+    import numpy as np
+
+    for run, prediction in zip(runs.runs, predictions, strict=True):
+        for signal, read, model in zip(run.signals, run.more, prediction.reshape(-1, run.count)[1:], strict=True):
+            moved = float(model[run.first:].std())
+            gain = float(read[run.first:].std()) / moved if moved else np.nan
+            sizes = [(unit, size) for unit, size in _SIZES.get(_KINDS.get(signal.measures, signal.measures), ())
+                     if abs(log(size)) > log(_NO_EFFECT) and 1 / _APART < gain / size < _APART]
+            if sizes:
+                unit, _ = min(sizes, key=lambda one: abs(log(gain / one[1])))
+                yield (f"{run.name}: expected {signal.name} in {signal.unit}, found {gain:.3g} times what the model "
+                       f"says: it looks like {unit}")
 
 
 def _other_roads(runs: SimulatedRuns, followed: _Followed, car: Car) -> Iterator[str]:
