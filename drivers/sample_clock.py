@@ -635,21 +635,21 @@ class DatedSamples:
         """That samples come too late to make rows, and what to do; empty: they do not."""
         if self.burst_s < LONGEST_BURSTS_S:
             return ""
-        return (f"its samples come some {self.burst_s:.1g} s at a time, as something on the way keeps them: too late "
-                "for rows, which stay empty. Have the sensor, or what brings its samples, send each as it is taken, "
-                "or three times a second")
+        return (f"its samples come {self.burst_s:.1g} s at a time, because something on the way buffers them: too "
+                "late for rows, which stay empty. Have the sensor, or its bridge, send each sample at once, or at "
+                "least three times a second")
 
     @property
     def note(self) -> str:
         """How the samples come, where that is worth knowing and does no harm; empty: as they should."""
         slow_hz, fast_hz = self.clock.rates_hz
         if fast_hz - slow_hz > DRIFT * fast_hz:
-            return (f"its clock drifts: {slow_hz:.1f} to {fast_hz:.1f} samples a second so far. Its samples are dated "
-                    "by when they come: nothing has to be done")
+            return (f"its clock drifts: {slow_hz:.1f} to {fast_hz:.1f} samples a second so far. ridelog dates its "
+                    "samples by their arrival: you need do nothing")
         if abs(slow_hz / self._rate_hz - 1) > self._tolerance:
-            return (f"it gives {slow_hz:.1f} samples a second where {self._rate_hz:g} are expected, and is taken at "
-                    "that rate: right if that is its own; if it has another one, samples are lost on the way")
+            return (f"it gives {slow_hz:.1f} samples a second where {self._rate_hz:g} are expected, and ridelog "
+                    "uses that rate. If the sensor's own rate is another one, samples are lost on the way")
         if BURSTS_S <= self.burst_s < LONGEST_BURSTS_S:
-            return (f"its samples come some {self.burst_s:.1g} s at a time, as something on the way keeps them. They "
-                    "are dated by their even rate: nothing has to be done")
+            return (f"its samples come {self.burst_s:.1g} s at a time, because something on the way buffers them. "
+                    "ridelog dates them by their even rate: you need do nothing")
         return ""

@@ -193,7 +193,7 @@ def _tables(source: Path, asked: CsvSettings, notes: list[str]) -> _Tables:
     _check_named(named or {}, [*headers, *beside])
     unknown = [one.path.name for one in headers if one not in [header for header, _ in known]]
     if source.is_dir() and unknown:
-        notes.append(f"not used, since nothing of it is known: {', '.join(unknown)}")
+        notes.append(f"not used, as ridelog knows none of its columns: {', '.join(unknown)}")
     header, felt = _acceleration(source, headers, known)
     acceleration = read_table(header, felt)
     apart = [one for one in known if one[1].has_gravity and not one[1].has_acceleration]
@@ -237,7 +237,7 @@ def _acceleration(source: Path, headers: list[Header], known: list[tuple[Header,
         if len(headers) == 1 and not headers[0].names:
             raise _no_header(headers[0])
         names = headers[0].names if len(headers) == 1 else ()
-        found = ",".join(names)[:160] if names else f"{len(headers)} files without any that is known"
+        found = ",".join(names)[:160] if names else f"{len(headers)} files, none with columns that ridelog knows"
         where = f"{headers[0].path}:{headers[0].line}" if names else source
         raise BadInput(f"{where}: expected columns of a known program, or named ones, with "
                        f"time and three axes (or up), found {found}: give {advice(names)}")
@@ -295,8 +295,8 @@ def _accelerations(tables: _Tables, asked: CsvSettings, notes: list[str]) -> tup
         gravity_s, gravity = _ordered(apart, seconds(apart, table), GRAVITY, [])
         gravity_unit = _one_unit(apart, GRAVITY) or unit
         if unit is None or gravity_unit is None:
-            raise BadInput(f"{table.header.path}: expected to know the unit of accelerations and gravity, which are to "
-                           "be added: name both in --columns, as in x=X:m/s2,gx=GX:m/s2")
+            raise BadInput(f"{table.header.path}: expected units of accelerations and gravity, to add the two, found "
+                           "none: name both in --columns, as in x=X:m/s2,gx=GX:m/s2")
         gravity = np.stack([np.interp(time_s, gravity_s, axis) for axis in gravity.T], axis=1)
         samples = ACCELERATION_UNITS[unit] * samples + ACCELERATION_UNITS[gravity_unit] * gravity
         unit, is_said = "m/s2", False
@@ -319,13 +319,13 @@ def _in_si(table: LoggerTable, time_s: Array, samples: Array, unit: str | None, 
     named = f"{roles[0]}={table.known.columns[roles[0]].header}:UNIT"
     found = felt(time_s, samples, ACCELERATION_UNITS.get(unit or ""))
     if unit is None and (is_linear or found.unit_mps2 is None):
-        raise BadInput(f"{path}: expected " + ("to know the unit, which no gravity shows" if is_linear else
+        raise BadInput(f"{path}: expected " + ("a unit or gravity to recognise it by, found neither" if is_linear else
                        f"gravity near 9.8 (m/s2) or 1 (g), by which to recognise the unit, found a mean of "
                        f"{found.size:.3g}") + f": name the unit in --columns, {named}, one of "
                        f"{', '.join(units_of(roles[0]))}")
     if unit is None:
         unit = next(one for one, scale in ACCELERATION_UNITS.items() if np.isclose(scale, found.unit_mps2 or 0.0))
-        notes.append(f"unit by the size of gravity: {unit}")
+        notes.append(f"unit recognised by the size of gravity: {unit}")
     samples, size_mps2 = samples * ACCELERATION_UNITS[unit], found.size * ACCELERATION_UNITS[unit]
     if found.unit_mps2 is not None:
         if asked.up is not None:
@@ -378,20 +378,21 @@ def _repairs(even: EvenSamples) -> list[str]:
     notes = []
     if even.repeats > 0:
         notes.append(f"{even.repeats:.0%} of the samples only repeated the one before and were dropped: "
-                     f"{even.own_hz:.4g} Hz were taken")
+                     f"the sensor gave {even.own_hz:.4g} Hz")
     if even.holds_s and even.repeats > 0:
         places = counted(len(even.holds_s), "place")
         notes[-1:] = [f"the sensor stood still on all axes for {sum(even.holds_s):.3g} s in {places}, the longest "
-                      f"{max(even.holds_s):.3g} s; nothing was taken then"]
+                      f"{max(even.holds_s):.3g} s; those samples are left out"]
     if not even.as_read:
         notes.append(f"{even.own_hz:.4g} samples a second, laid on an even grid of {RATE_HZ:g} Hz")
     if SEEN * even.own_hz < _FLAT_TO_HZ:
-        notes.append(f"shows nothing above {SEEN * even.own_hz:.0f} Hz: the lab may take that for a slow sensor "
-                     "(sensor_bandwidth)")
+        notes.append(f"shows nothing above {SEEN * even.own_hz:.0f} Hz: the lab may name sensor_bandwidth for that")
     if even.clipped.any():
-        notes.append(f"{np.count_nonzero(even.clipped)} samples stand at an end of the sensor's range, and are marked")
+        notes.append(f"{np.count_nonzero(even.clipped)} samples at an end of the sensor's range, marked in the column "
+                     "usable")
     if not even.present.all():
-        notes.append(f"{np.count_nonzero(~even.present) / RATE_HZ:.2g} s lie in holes between samples, and are marked")
+        notes.append(f"{np.count_nonzero(~even.present) / RATE_HZ:.2g} s in holes between samples, marked in the "
+                     "column usable")
     return notes
 
 
@@ -416,7 +417,7 @@ def _levelled(even: EvenSamples, asked: CsvSettings, has_gravity: bool, notes: l
     heard = np.flatnonzero(present)
     turned = turns(time_s[heard], even.samples[heard]) if even.samples.shape[1] == 3 else []
     for at_s, words in turned:
-        notes.append(f"at {at_s:.0f} s {words} in its mount: cut there, and levelled again")
+        notes.append(f"at {at_s:.0f} s {words} in its mount: extract cut the record there and levelled it again")
         present &= np.abs(time_s - at_s) > _CUT_S
     ends_s = [-np.inf, *(at_s for at_s, _ in turned), np.inf]
     tilts = []
@@ -461,7 +462,7 @@ def _fixes(tables: _Tables, asked: CsvSettings, config: Config, origin_s: float,
         said = "none" if not len(found.time_s) else (
             f"those from {found.time_s[0]:.6g} to {found.time_s[-1]:.6g} s beside accelerations from {span_s[0]:.6g} "
             f"to {span_s[1]:.6g} s")
-        raise BadInput(f"{table.header.path}: expected fixes by the clock of {path.name}, at the same time, found "
+        raise BadInput(f"{table.header.path}: expected fixes by the clock of {path.name}, in the same period, found "
                        f"{said}")
     found = found.part(inside)
     check_speed(table, found)

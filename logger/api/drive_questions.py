@@ -331,8 +331,9 @@ class SimulateQuestion(Question):
         _OBSTACLES, metavar="NAME:PARAM=VALUE,...", read=str, many=list, flag="--obstacle")] = None
     rate_hz: Annotated[float, Option("samples a second", RATE, "HZ")] = 100.0
     noise_mps2: Annotated[float, Option("r.m.s. of the sensor's noise [m/s2]", ADDED, "MPS2")] = 0.0
-    step_mps2: Annotated[float, Option("the sensor gives whole multiples of this only [m/s2]", ADDED, "MPS2")] = 0.0
-    seed: Annotated[int, Option("another number, another noise (default: 1)", Range(0, float("inf")), "N")] = 1
+    step_mps2: Annotated[float, Option("step of the sensor: readings are whole multiples of it "
+                                       "[m/s2]", ADDED, "MPS2")] = 0.0
+    seed: Annotated[int, Option("seed of the noise (default: 1)", Range(0, float("inf")), "N")] = 1
     name: Annotated[str, "of the run; each of several needs its own"] = "simulated"
 
     def __post_init__(self) -> None:
@@ -370,12 +371,12 @@ class SimulateCommand(SimulateQuestion):
         "then lasts as long as the file", metavar="MPS|FILE", read=_file_or("m/s"))] = None  # type: ignore[assignment]
     _: KW_ONLY
     excitation: Annotated[Path | None, Option(
-        "what stands under the wheels of a rig over time instead: CSV (t_s,elevation_m[,elevation_rear_m]); without "
-        "--speed", metavar="FILE", read=Path)] = None
+        "for a test rig, in place of --profile and --speed: the elevation under its wheels over time, as CSV "
+        "(t_s,elevation_m[,elevation_rear_m])", metavar="FILE", read=Path)] = None
     effects: Annotated[Sequence[str], Option(
-        "a physical effect, or the path of a Python file with one of your own; may repeat. What is not said is at its "
-        "usual value; takes the place of the vehicle's own effect of that name", metavar="NAME[:PARAM=VALUE,...]",
-        read=str, many=list, flag="--effect")] = ()
+        "a physical effect, or the path of a Python file with one of your own; may repeat. Parameters that you do not "
+        "give have their usual values. It replaces the vehicle's own effect of that "
+        "name", metavar="NAME[:PARAM=VALUE,...]", read=str, many=list, flag="--effect")] = ()
     outputs: Annotated[Sequence[str], Option(
         "further columns; may repeat. wheels: their acceleration; travel: extension of the suspensions; tires: height "
         "of the wheels over the road; body:ahead_m=X,left_m=Y: acceleration of another point of the body, from the "
@@ -385,7 +386,7 @@ class SimulateCommand(SimulateQuestion):
         super().__post_init__()
         given = {one: getattr(self, one) for one in ("profile", "speed_mps", "obstacles")}
         if self.excitation is not None and (beside := [one for one, value in given.items() if value not in (None, [])]):
-            raise self.wrong(beside[0], ": expected none of it with `excitation`: a rig stands, and has no road")
+            raise self.wrong(beside[0], ": expected none with `excitation`, as a rig has no road")
         if self.excitation is None and (missing := [one for one in ("profile", "speed_mps") if given[one] is None]):
             raise self.complaint(f"simulate: expected {', '.join(f'`{one}`' for one in missing)}")
         if isinstance(self.profile, float) and (words := _FLAT.fault(self.profile)):
@@ -492,7 +493,7 @@ class RandomRoadQuestion(Question):
         "M_PER_KM")] = None
     length_m: Annotated[float, Option("[m]", LENGTH, "M")] = 1000.0
     spacing_m: Annotated[float, InPython("between samples [m]", SPACING)] = 0.05
-    seed: Annotated[int, Option("another number, another road (default: 1)", Range(0, float("inf")), "N")] = 1
+    seed: Annotated[int, Option("seed of the random road (default: 1)", Range(0, float("inf")), "N")] = 1
     waviness: Annotated[float, InPython("w, the slope of the spectrum", ROAD_WAVINESS)] = 2.0
 
     def __post_init__(self) -> None:

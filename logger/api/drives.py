@@ -410,37 +410,36 @@ def window_lines(found: Assessment) -> Iterator[str]:
 def lines(found: Assessment, summary: dict[str, Any]) -> list[str]:
     """The lines a person sees; ``summary``: the same as JSON."""
     way_m = summary["distance_end_m"] - summary["distance_start_m"]
-    shown = [
+    details = [
         f"{summary['run']}: {way_m:.0f} m in a {summary['vehicle']}, "
         f"{len(found.drive.distance_m) / summary['rate_hz']:.0f} s at {summary['rate_hz']:.5g} Hz; windows of "
         f"{summary['window_m']:.4g} m",
         *_sensor_lines(summary),
     ]
     if summary["distance_moved_m"]:
-        shown.append("The distance went back here and there: computed again from the speed, "
-                     f"{summary['distance_moved_m']:.2f} m off at most.")
+        details.append("The distance ran backwards in places; estimate recomputed it from the speed, which moved it by "
+                       f"up to {summary['distance_moved_m']:.2f} m.")
     if found.road_effects:
-        shown.append(f"Compared with the road that {' and '.join(found.road_effects)} of the vehicle's file makes of "
-                     "the profile.")
-    if hint := _unit_hint(found):
-        shown.append(hint)
+        details.append(f"Compared with the profile as {' and '.join(found.road_effects)} in the vehicle's file "
+                       "changes it.")
+    doubts = [hint] if (hint := _unit_hint(found)) else []
     if not summary["answered_count"]:
-        return [*shown, f"No IRI: {_unanswered(summary) or 'not one whole window was driven'}"]
+        return [f"No IRI: {_unanswered(summary) or 'the drive is shorter than one window'}", *doubts, *details]
     limit = summary["limit"]
-    shown += [
-        "", f"IRI {summary['iri_m_per_km']:.2f} m/km on average, {summary['iri_min_m_per_km']:.2f} to "
-        f"{summary['iri_max_m_per_km']:.2f}; {summary['answered_count']} of {summary['window_count']} windows"
-        + (f" ({_unanswered(summary)})" if summary["unanswered"] else "") + ".",
-        f"An estimator that knew everything would reach R2 {limit['r2_iri_1_to_10']:.3f} over roads of IRI "
-        f"{MIX_IRI[0]} to {MIX_IRI[-1]}, {limit['r2_this_road']:.3f} on a road like this one; standard error "
-        f"{limit['std_m_per_km']:.2f} m/km at {summary['speed_mps']:.0f} m/s.",
+    details += [
+        "The limit, an estimator that knows road, car and noise exactly: standard error "
+        f"{limit['std_m_per_km']:.2f} m/km at {summary['speed_mps']:.0f} m/s; R2 {limit['r2_iri_1_to_10']:.3f} over "
+        f"roads of IRI {MIX_IRI[0]} to {MIX_IRI[-1]}, {limit['r2_this_road']:.3f} on a road like this one.",
         "Wavelengths resolved: " + _range_words(found),
     ]
     if (factor := summary["iri_std_m_per_km"] / limit["std_m_per_km"]) > _FAR_ABOVE:
-        shown.append(f"The standard errors are {factor:.1f} times as large: no vehicle file is trusted beyond a few "
-                     "percent, and there may be more in the readings than vehicle and noise explain.")
-    shown += ["", *_table(summary)]
-    return shown
+        details.append(f"The standard errors are {factor:.1f} times that limit: they include a few percent of error in "
+                       "the vehicle file, and readings that vehicle and noise do not explain.")
+    answer = (f"IRI {summary['iri_m_per_km']:.2f} m/km on average, {summary['iri_min_m_per_km']:.2f} to "
+              f"{summary['iri_max_m_per_km']:.2f}; standard error of one window {summary['iri_std_m_per_km']:.2f}; "
+              f"{summary['answered_count']} of {summary['window_count']} windows"
+              + (f" ({_unanswered(summary)})" if summary["unanswered"] else "") + ".")
+    return [answer, *doubts, "", *_table(summary), "", *details]
 
 
 def _sensor_lines(summary: dict[str, Any]) -> list[str]:
@@ -448,7 +447,7 @@ def _sensor_lines(summary: dict[str, Any]) -> list[str]:
     noise, std = summary["noise_mps2"], summary["noise_std_mps2"]
     rounded = f"rounded to {summary['step_mps2']:g} m/s2 (--step)" if summary["step_mps2"] else "not rounded (--step)"
     if summary["noise_learnt"] is False:
-        return [f"This drive shows nothing of the noise. Assumed: {noise:g} m/s2 in a reading, {rounded}"]
+        return [f"This drive does not show the sensor's noise. Assumed: {noise:g} m/s2 in a reading, {rounded}"]
     if std is None:
         return [f"Assumed: noise of {noise:g} m/s2 in a reading (--noise), {rounded}"]
     shown = (f"noise of {noise:.3g} ± {std:.1g} m/s2 in a reading" if std < _UNCERTAIN * noise else
@@ -488,7 +487,7 @@ def _range_words(found: Assessment) -> str:
 def _table(summary: dict[str, Any]) -> Iterator[str]:
     """Per class of speed: the estimates, then the comparison where there is one."""
     compared = "comparison" in summary
-    yield (f"{'m/s':>10}{'windows':>9}{'answered':>10}{'IRI':>8}{'std. error':>12}{'limit':>8}"
+    yield (f"{'m/s':>10}{'windows':>9}{'with IRI':>10}{'IRI':>8}{'std. error':>12}{'limit':>8}"
            + (f"   {'R2':>7}{'limit':>7}{'bias':>8}{'in 1':>7}{'in 2':>6}" if compared else ""))
     total = [{"from_mps": None, **summary}] if len(summary["speeds"]) > 1 else []
     for row in [*summary["speeds"], *total]:
@@ -501,4 +500,5 @@ def _table(summary: dict[str, Any]) -> Iterator[str]:
                      f"{found['within_two']:6.2f}")
         yield line
     if compared:
-        yield "R2 against the profile; in 1, in 2: windows within one and two standard errors (ideal: 0.68, 0.95)."
+        yield ("R2 against the profile; in 1, in 2: share of windows within one and two standard errors (ideal: 0.68, "
+               "0.95).")

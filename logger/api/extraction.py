@@ -324,7 +324,8 @@ def _make_room(folders: list[Path], source: Path, out: Path) -> None:
             raise BadInput(f"{folder}: expected a folder for a run of {source}, found a link to another place: remove "
                            "the link")
         if folder not in earlier and folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
-            raise BadInput(f"{folder}: expected an empty folder for a run of {source}, found the run of something else")
+            raise BadInput(f"{folder}: expected an empty folder for a run of {source}, found a run of another "
+                           "recording")
     for folder in earlier:
         for name in (drive_file.DRIVE, drive_file.PROFILE, RUN):
             remove_file(folder / name)
@@ -383,7 +384,7 @@ def _drives(recorded: Recorded, measured: MeasuredProfile | None) -> tuple[list[
         LeftOut(seconds["parked"], "s", "of a parked car"),
         LeftOut(max(0.0, seconds["driven"] - laid_s), "s", "off the profile" if measured else "between two runs"),
         LeftOut(laid_s - long_s, "s", f"in stretches of less than {LEAST_S:g} s or {LEAST_M:g} m"),
-        LeftOut(long_s - kept_s, "s", "without a good reading: none was taken, or the sensor was clipped")))
+        LeftOut(long_s - kept_s, "s", "without a good reading: the sensor gave none, or clipped")))
 
 
 def _off_the_line(line: MeasuredLine, driven_m: Array, along_m: Array, aside_m: Array) -> str:
@@ -392,10 +393,9 @@ def _off_the_line(line: MeasuredLine, driven_m: Array, along_m: Array, aside_m: 
         return ": the drive goes along the profile from its end to its beginning"
     near = aside_m <= ASIDE_M
     if not near.any():
-        return f": the nearest fix is {aside_m.min():.0f} m aside of it"
+        return f": the nearest fix is {aside_m.min():.0f} m from it"
     near_m = np.diff(driven_m)[near[1:] & near[:-1]].sum()
-    return (f": only {near_m:.0f} m of the drive are within {ASIDE_M:g} m of it, whose places go over "
-            f"{np.ptp(line.distance_m):.0f} m")
+    return (f": only {near_m:.0f} m of the drive are within {ASIDE_M:g} m of its {np.ptp(line.distance_m):.0f} m")
 
 
 def _along(recorded: Recorded, fixes: Fixes, measured: MeasuredProfile | None) -> list[_Drive]:

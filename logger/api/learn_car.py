@@ -268,9 +268,9 @@ def _not_linear(rough: LearnedCar, smooth: LearnedCar) -> str:
     name = _most_apart(rough, smooth, _COMPARED[:-1])
     at = COORDINATES.index(name)
     like = "friction" if rough.x[at] < smooth.x[at] else "a progressive spring or damper"
-    return (f"This car is not linear: {_words_of(name)} is {_value(rough, name)} on rough road, {_value(smooth, name)} "
-            f"on smooth road, as with {like}. The errors hold half the difference; ridelog diagnose over a measured "
-            "street finds the effect.")
+    return (f"This car is nonlinear: its {_words_of(name)} is {_value(rough, name)} on rough roads and "
+            f"{_value(smooth, name)} on smooth ones, as with {like}. The standard errors include half the difference. "
+            "To find the effect, drive a measured street and run ridelog diagnose.")
 
 
 def _most_apart(one: LearnedCar, other: LearnedCar, names: Sequence[str]) -> str:
@@ -287,9 +287,9 @@ def _check_wheelbase(problem: UnknownCar, car: LearnedCar) -> None:
     off, std = float(found.x[at] - np.log(problem.knowledge.wheelbase_m)), float(found.std[at])
     if abs(off) > max(_SIGMA * std, _WRONG_WHEELBASE):
         metres = float(np.exp(found.x[at]))
-        raise CheckFailed(f"--wheelbase {problem.knowledge.wheelbase_m:g}: the drives show axles {metres:.2f} ± "
-                          f"{max(metres * std, 0.005):.2f} m apart: measure it again, between the hubs of one side "
-                          "(with a trailer, or of two cars, drives show none)")
+        raise CheckFailed(f"--wheelbase {problem.knowledge.wheelbase_m:g}: expected the distance that the drives show, "
+                          f"{metres:.2f} ± {max(metres * std, 0.005):.2f} m: measure it again, hub to hub on one side "
+                          "(a trailer, or drives of two cars, cause this as well)")
 
 
 def _moved(x: Array, at: int, step: float) -> Array:
@@ -329,8 +329,8 @@ def _checked_drives(used: Sequence[_Used], knowledge: CarKnowledge, start: Array
         those = "this drive is" if len(group) == 1 else f"this and the {len(group) - 1} drives after it are"
         as_what = "the others" if len(others) > 1 else others[0].name
         raise CheckFailed(
-            f"{group[0].name}: {those} not of the same car as {as_what}: {_words_of(name)} {_value(own, name)}, "
-            f"not {_value(rest, name)}: learn each car from its own drives (a trailer, a full boot or other tires "
+            f"{group[0].name}: {those} not of the same car as {as_what}: its {_words_of(name)} is {_value(own, name)}, "
+            f"not {_value(rest, name)}. Learn each car from its own drives (a trailer, a full boot or other tires "
             "make another car)")
     return [(spectra, rest) for _, _, _, spectra, _, rest in found]
 
@@ -468,26 +468,26 @@ def _table(values: Mapping[str, float], deviations: Mapping[str, float]) -> Iter
 
 
 def _iri_lines(now: Mapping[float, float], ever: Mapping[float, float]) -> Iterator[str]:
-    yield "What the IRI can still be off because of the car, as a standard error [%]:"
+    yield "Standard error of the IRI because of the car [%]:"
     yield f"  {'at km/h':26}" + "".join(f"{3.6 * speed:7.0f}" for speed in now)
     yield f"  {'any car of this wheelbase':26}" + "".join(f"{100 * value:7.0f}" for value in ever.values())
     yield f"  {'this car':26}" + "".join(f"{100 * value:7.1f}" for value in now.values())
-    yield ("It counts that dampers work harder in rebound than in compression, up to 2:1, which such drives do not "
-           "show.")
+    yield ("It includes dampers up to twice as hard in rebound as in compression, which such drives do not show.")
 
 
 def _kept_lines(errors: Mapping[str, Any]) -> Iterator[str]:
     if not errors["drives"]:
-        yield "One drive: none could be held out to check the car."
+        yield "Only one drive: give another, so that each can check the car learnt from the other."
         return
-    yield (f"Each drive held out in turn: its spectra differ {errors['misfit_before']:.1f} times as much as by chance "
-           f"from any car of this wheelbase, {errors['misfit_after']:.1f} times from a car learnt from the others.")
+    yield ("Check, each drive held out in turn: its spectra differ from the average car of this wheelbase by "
+           f"{errors['misfit_before']:.1f} times chance, from the car learnt from the other drives by "
+           f"{errors['misfit_after']:.1f} times (ideal: 1).")
 
 
 def _mass_line(question: LearnCarQuestion, mass: float) -> str:
     if question.mass_kg is None:
-        return ("Masses, springs and dampers share a scale that drives do not show and the IRI does not need. It is "
-                f"set by convention: {mass:.0f} kg on the springs of one side; --mass sets that of your car.")
+        return ("Masses, springs and dampers share a scale that drives do not show and the IRI does not need. By "
+                f"convention it is {mass:.0f} kg on the springs of one side; --mass sets that of your car.")
     return (f"Masses, springs and dampers are those of a car of {question.mass_kg:g} kg: {mass:.0f} kg on the springs "
             "of one side.")
 
@@ -498,12 +498,12 @@ def _warnings(problem: UnknownCar, car: LearnedCar, values: Mapping[str, float],
         name = f"{end}.damping_ratio"
         if values[name] + deviations[name] < _LIMP:
             yield (f"The {end} damping ratio of {values[name]:.2f} is that of a worn damper (new ones: 0.2 to 0.4): "
-                   "have it looked at.")
+                   "have it checked.")
     if (off := misfit(problem, car.x)) > _MISFIT:
         yield (f"The spectra differ {off:.1f} times as much as by chance from any car on two axles: was there a "
                "trailer or a load that moved, is the sensor loose or on another axis?")
     if not car.is_converged:
-        yield "The search did not come to an end: the numbers may be off by more than their errors; give more drives."
+        yield "The search did not converge: parameters may be off by more than their standard errors; give more drives."
 
 
 def _not_identifiable(problem: UnknownCar, car: LearnedCar) -> Iterator[str]:
@@ -517,8 +517,8 @@ def _not_identifiable(problem: UnknownCar, car: LearnedCar) -> Iterator[str]:
     prior = problem.knowledge.std
     unknown = [name for at, name in enumerate(NUMBERS) if car.std[at] > 0.8 * prior[at]]
     if unknown:
-        yield (f"These drives do not show the {', the '.join(map(_words_of, unknown))}: as of published cars, with "
-               "their spread.")
+        yield (f"These drives do not show the {', the '.join(map(_words_of, unknown))}: there the values and errors "
+               "are those of published cars.")
 
 
 def _changes(question: LearnCarQuestion, car: LearnedCar) -> Iterator[str]:
@@ -560,7 +560,8 @@ def _misfits(used: Sequence[_Used], knowledge: CarKnowledge, car: LearnedCar, sp
             continue
         numbers = [NUMBERS.index(one) for one in _COMPARED[:-1]]
         most = NUMBERS[max(numbers, key=lambda one: abs(x[one] - car.x[one]) / car.std[one])]
-        yield (f"These drives do not fit {name}, which the settings named: {_words_of(most)} is {_value(car, most)}, "
+        yield (f"These drives do not fit {name}, the vehicle in the settings: {_words_of(most)} is "
+               f"{_value(car, most)}, "
                f"not {np.exp(x[NUMBERS.index(most)]):.3g}; its IRI is {100 * (bias[at] - 1):+.0f} % off at "
                f"{3.6 * speeds_mps[at]:.0f} km/h.")
 

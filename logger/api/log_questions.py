@@ -98,7 +98,7 @@ class SectionsQuestion(LogsQuestion):
     units: Annotated[str | None, Option(
         "of what is printed (default: us where the length is in miles or feet, else si)", choices=SYSTEMS)] = None
     route: Annotated[Path | str | None, Option(
-        "count by the measures of this line, along and against it", metavar="LINE.geojson", read=Path)] = None
+        "measure sections along this line, for both directions", metavar="LINE.geojson", read=Path)] = None
     localized_m_per_km: Localized = None
 
 
@@ -203,12 +203,12 @@ class IngestQuestion(LogsQuestion):
     car: Annotated[str | None, Option(
         "the car's name (default: the vehicle's name in the description beside each log; give one where cars share "
         "it)", metavar="NAME")] = None
-    car_folders: Annotated[bool, Option("each car has a folder of logs, which is called as it is")] = False
+    car_folders: Annotated[bool, Option("each car has its own folder of logs, named after the car")] = False
     roads: Annotated[Path | str | None, Option(
         "roads to lay the windows on, at the first ingest (default: cells of the ground of 66 ft)",
         metavar="FILE.geojson", read=Path)] = None
     trim_m: Annotated[float | None, Option(
-        "leave out so much of each drive's start and end, from the first ingest on [m] (default: 0)",
+        "leave out this length at each drive's start and end [m]; the first ingest sets it (default: 0)",
         Range(0.0, 10_000.0, "m"), "M", flag="--trim-m")] = None
 
     def __post_init__(self) -> None:

@@ -136,7 +136,7 @@ def check_out(out: Path, runs: Iterable[Path], read: Iterable[Path] = (), option
     if out.resolve() in {path.resolve() for path in read}:
         raise BadInput(f"{said}: expected another file than those that are read")
     if not out.parent.is_dir() or out.is_dir():
-        raise BadInput(f"{said}: expected a file in a folder that there is")
+        raise BadInput(f"{said}: expected a file in a folder that exists")
     if why := why_not_written(out):
         raise BadInput(f"{said}: expected a file that may be written ({why})")
 

@@ -87,7 +87,7 @@ def _drive(out: Path, as_json: bool) -> None:
 
 _UNMEASURED = (
     "A box in an old car recorded four ordinary drives over four roads, at 30 to 100 km/h. Nobody measured the roads, "
-    "and of the car nothing but its wheelbase is known. All of it is simulated. What car is this?"
+    "and nothing but the car's wheelbase is known. All of it is simulated. What car is this?"
 )
 _ORDINARY = ((30.0, "C"), (50.0, "C"), (70.0, "B"), (100.0, "B"))
 """Speed of each drive [km/h] and class of its road; each lasts ``_ORDINARY_S``."""
@@ -130,13 +130,14 @@ def car(out: Path, unpack_only: bool, as_json: bool) -> None:
         was, found = (np.exp(coordinates_of(one.vehicle)) for one in (true, read_vehicle(learnt)))
         rows = [(name, f"{was[at]:.3f}", f"{found[at]:.3f}") for at, name in enumerate(NUMBERS)
                 if name.endswith(("_hz", "damping_ratio"))]
-        print("\n".join(["", "What the simulated car truly was:", "", *columns([("Number", "True", "Found"), *rows])]))
+        head = ["", "True values of the simulated car:", ""]
+        print("\n".join([*head, *columns([("Parameter", "True", "Found"), *rows])]))
 
 
 _INTRODUCTION = (
-    "Somebody drove a RAV4 along two poor town streets with speed bumps, slowly on the one and briskly on the other, "
-    "with an accelerometer on the body. Both streets were measured beforehand, and the file of the car, rav4-2009, "
-    "comes with ridelog. This car has something that its file does not know, and the lab finds out what."
+    "Somebody drove a RAV4 along two poor town streets with speed bumps, slowly on one and briskly on the other, with "
+    "an accelerometer on the body. Both streets had been measured, and the car's file, rav4-2009, comes with ridelog. "
+    "This car has something that its file lacks, and the lab finds out what."
 )
 _LAB_EXPLAINED = {
     "compare": "First question: does the model fail at all, or are only its parameters a little off? Nominal masses "
@@ -193,29 +194,29 @@ def truth_beside(story: Story, car: TrueCar) -> tuple[str, list[str]]:
     from logger.report.quantities import numbers_of
 
     found = {one.effect.name for one in story.last.effects}
-    rows = [("Number", "True", "Without", "With")]
+    rows = [("Parameter", "True", "Without", "With")]
     rows += [(one.name, f"{car.off.get(one.name, 1.0) - 1:+.1%}", f"{one.without / one.nominal - 1:+.1%}",
               f"{one.found / one.nominal - 1:+.1%} ± {one.standard_error / one.found:.1%}") for one in story.moved]
     numbers = ", ".join(f"{name} {value:.3g}" for name, value in car.values.items())
     mine = numbers_of(story.rounds[-1].addition.new[-1]) if car.effect in found else "nothing of the kind"
-    return (f"The drives were simulated. The car had {car.effect}, {numbers}; found: {mine}. Its numbers differed from "
-            "its file, in per cent:", columns(rows))
+    return (f"The drives were simulated. The car had {car.effect}, {numbers}; found: {mine}. Difference of its "
+            "parameters from its file:", columns(rows))
 
 
 PAGE, RUNS = "field.html", "runs"
 _ABOUT = (
     "A box in a RAV4 recorded three drives along one street, slowly, briskly and fast, and a fourth over the street "
-    "beyond. The second and the fourth have the BMA220 of the box, with its steps of 0.6 m/s2; for the first and the "
-    "third a serial accelerometer was plugged in. Both streets had been measured. All of it is simulated: car, "
-    "streets and receiver, down to the bytes.",
-    "This car has something that its file, rav4-2009, does not know, and it makes the IRI wrong. The lab finds it from "
-    "the first three drives; the fourth tells whether it was right.",
+    "beyond. Drives two and four come from the box's BMA220, which reads in steps of 0.6 m/s2, drives one and three "
+    "from a serial accelerometer. Both streets had been measured. All of it is simulated: car, streets and GPS, down "
+    "to the bytes.",
+    "This car has something that its file, rav4-2009, lacks, and that makes the IRI wrong. The lab finds it from the "
+    "first three drives; the fourth shows whether the lab was right.",
 )
 _EXPLAINED = {
-    "extract": "First the bytes become runs. Look at the positions: GPS fixes are late and wrong by a metre or two, "
-               "but the car felt the measured road, and that tells where it was.",
-    "before": "What does the box say of the fourth street? Look at the bias, and at the share of windows within two "
-              "standard errors (ideal: 95%). On a street that nobody measured, nothing would show that it is wrong.",
+    "extract": "First, extract turns the bytes into runs. Look at the places: GPS fixes are late and a metre or two "
+               "off, but the car felt the measured road, and that shows where it was.",
+    "before": "What IRI does the box give for the fourth street? Look at the bias, and at the share of windows within "
+              "two standard errors (ideal: 95%). On a street that nobody measured, nothing would show the error.",
     "compare": "Does the model fail on the three drives, or are only its parameters a little off? compare first refits "
                "them within a few per cent. Look at the residual that remains, and where it is.",
     "diagnose": "Which physical effect would explain that? Look at the p-value, and at the NRMSE on held-out "
@@ -223,7 +224,7 @@ _EXPLAINED = {
     "add": "ridelog fits the effect and the car's parameters on all three drives. Look at the parameters that the "
            "missing effect had biased.",
     "again": "Is that all? Look for anything that is more than noise.",
-    "after": "The fourth drive once more, which the lab has never seen, with the new file.",
+    "after": "The same estimate with the new file. The lab has never seen this drive.",
 }
 
 
@@ -248,11 +249,11 @@ def field(out: Path, unpack_only: bool, as_json: bool) -> None:
     tell([wrapped(_ABOUT)])
     tell(_headed("Extract", "extract", *commands.extract()))
     extracted = [*(_extracted(one, out, LINE, tell) for one in first), _extracted(fourth, out, BEYOND, tell)]
-    before = _judged(out / RUNS / FOURTH, FIELD.vehicle, "The fourth drive, by the file as it is", "before", commands,
+    before = _judged(out / RUNS / FOURTH, FIELD.vehicle, "The fourth drive, with the original file", "before", commands,
                      tell)
     story = _story(commands, out, tell)
     last = story.rounds[-1].file if story.rounds else FIELD.vehicle
-    after = _judged(out / RUNS / FOURTH, last, "The fourth drive, by the last file", "after", commands, tell)
+    after = _judged(out / RUNS / FOURTH, last, "The fourth drive, with the new file", "after", commands, tell)
     page, sentence, table = out / PAGE, *truth_beside(story, FIELD)
     _write_page(page, out, story, before, after, sentence)
     tell(_ending(story, before, after, page))
@@ -363,9 +364,9 @@ def _judged(folder: Path, vehicle: str, title: str, why: str, commands: _Command
 
 def _essential(lines: list[str]) -> Iterator[str]:
     """Of what ``ridelog estimate`` prints: the mean, and the table's head, last row and remark."""
-    yield next(line for line in lines if line.startswith(("IRI", "No IRI")))
-    table = [line for line in lines[lines.index("") :] if "bias" in line or line.lstrip().startswith("all ")]
-    yield from ["", *table, lines[-1]]
+    answer, table = lines[0], lines[lines.index("") + 1 :]
+    table = table[: table.index("")]
+    yield from [answer, "", table[0], *(line for line in table if line.lstrip().startswith("all ")), table[-1]]
 
 
 # --- what it came to ---
@@ -386,7 +387,7 @@ def _write_page(file: Path, out: Path, story: Story, before: Assessment, after: 
         driven.append(MapLine(name, lat_deg, lon_deg))
     write_text(file, field_page(f"{FIELD.vehicle}: four drives, and what was missing", _ABOUT, measured, driven, story,
                                 before,
-                          after, [sentence.partition(" Its numbers")[0]]))
+                          after, [sentence.partition(" Difference")[0]]))
 
 
 def _ending(story: Story, before: Assessment, after: Assessment, page: Path) -> list[str]:
@@ -431,8 +432,8 @@ def _name(dump: Path) -> str:
 
 
 _SHOWN = {
-    "lab": (lab, LAB_DIR, "show the lab instead: two drives of a car that has something its model lacks, found"),
-    "field": (field, FIELD_DIR, "show the loop from a car's recordings to a better IRI: four drives, two roads"),
+    "lab": (lab, LAB_DIR, "show the lab instead: it finds what the model of a car lacks, from two drives"),
+    "field": (field, FIELD_DIR, "show the way from recordings in a car to a better IRI: four drives, two roads"),
     "car": (car, CAR_DIR, "learn a car that nobody measured: four ordinary drives, its springs and dampers"),
 }
 """What can be shown instead of a drive through the service, the folder for it, and its help."""

@@ -55,18 +55,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     group.add_argument("--csv", nargs="+", type=Path, default=[], metavar="FILE|FOLDER",
                        help="recordings, in place of DUMP; a folder holds the files of one recording")
     group.add_argument("--location", type=Path, metavar="FILE.csv",
-                       help="the file with speed or place of the one recording, by the same clock")
+                       help="the file with the speed or place of the recording, on the same clock")
     group.add_argument("--columns", metavar="ROLE=COLUMN[:UNIT],...",
                        help="which columns are what: t (s, ms, us, ns, iso), x y z or up, the acceleration (m/s2, g, "
                             "mg), gx gy gz, gravity, lat, lon, speed (m/s, km/h, mph, kn). Without a unit: the one at "
                             "the end of the column's name, or what gravity and the clock show")
     group.add_argument("--up", choices=("x", "y", "z", "-x", "-y", "-z"),
-                       help="the axis that points up, of a record from which gravity was taken out (write --up=-z)")
+                       help="for a record without gravity: the axis that points up (write --up=-z)")
     group.add_argument("--sign", choices=("+", "-"),
-                       help="-: turn the acceleration upside down, for a program that counts gravity and "
-                            "accelerations in opposite ways (write --sign=-)")
+                       help="-: change the sign of the acceleration, for a program that gives gravity the opposite "
+                            "sign (write --sign=-)")
     group.add_argument("--range", type=float, metavar="G",
-                       help="range of the sensor: readings there are marked as clipped (default: where it shows)")
+                       help="range of the sensor: readings at its ends are marked as clipped (default: ridelog "
+                            "recognises the range)")
     group.add_argument("--speed", type=float, metavar="MPS", help="the constant speed of a recording that has none")
 
 
@@ -150,12 +151,12 @@ def lines(source: Path, found: Extracted) -> list[str]:
     for one in found.runs:
         words = f"{one.run}: {one.seconds:.0f} s, {one.metres:.0f} m"
         if one.place_std_m is not None:
-            how = "matched to the road" if one.by_road else "by the receiver alone: the road was not recognised"
+            how = "matched to the road" if one.by_road else "by GPS alone: the road was not recognised"
             words += f" on the profile, places ± {one.place_std_m:.2g} m ({how})"
         if one.gaps:
             words += f", {one.gaps} short gaps" if one.gaps > 1 else ", 1 short gap"
         if one.delay_s or one.delay_std_s:
-            words += f"; taken out: a receiver's delay of {one.delay_s:.2f} ± {one.delay_std_s:.2f} s"
+            words += f"; corrected for a GPS delay of {one.delay_s:.2f} ± {one.delay_std_s:.2f} s"
         printed.append(words)
         if (scale := one.unusual_speed_scale) is not None:
             printed.append(f"{one.run}: taken out: speeds that are {100 * scale[0]:.2f} ± {100 * scale[1]:.2f} % of "

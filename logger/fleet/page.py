@@ -339,7 +339,7 @@ _STYLE = """
 _LIMITS_M_PER_KM = tuple(limit * INCH_PER_MILE_M_PER_KM for limit in (GOOD_BELOW_IN_PER_MI, FAIR_TO_IN_PER_MI))
 """Of colours: those by which a section is rough, so that the map and the list of visits say the same."""
 _MODES = (("m", "Mean IRI"), ("w", "Roughest"), ("t", "Became worse"))
-_HINT = "Tap or click a piece of road for its figures; the nearer the map, the finer they are."
+_HINT = "Tap or click a piece of road for its figures; zoom in for finer pieces."
 
 
 def fleet_page(figures: FleetFigures, sections: RoadTable) -> Html:
@@ -419,8 +419,8 @@ def _worse(sections: RoadTable) -> Html:
              f"{sections.trend_m_per_km_per_year[one]:+.2f} ± {sections.trend_std_m_per_km_per_year[one]:.2f}",
              f"{sections.p_value[one]:.1g}") for one in order]
     return section("Became worse", grid(("Place", "IRI [m/km]", "A year [m/km]", "p"), rows) + hint(
-        f"The {len(rows)} most certain of {int(sections.worse.sum()):,}; of all that are called worse at most "
-        f"{FALSE_SHARE:.0%} are so falsely (Benjamini and Hochberg 1995).")) if rows else EMPTY
+        f"The {len(rows)} most certain of {int(sections.worse.sum()):,}; at most {FALSE_SHARE:.0%} of all that are "
+        "called worse are false (Benjamini and Hochberg 1995).")) if rows else EMPTY
 
 
 def _cars(figures: FleetFigures) -> Html:
@@ -441,10 +441,10 @@ _TILES = "tiles"
 def check_folder(out: Path) -> None:
     """Raise BadInput for a place that is neither free nor a report's."""
     if not out.parent.is_dir():
-        raise BadInput(f"--out {out}: expected a folder in a folder that there is")
+        raise BadInput(f"--out {out}: expected a folder inside one that exists")
     is_report = (out / INDEX).is_file() and (out / _TILES).is_dir()
     if out.exists() and not is_report and not (out.is_dir() and not any(out.iterdir())):
-        raise BadInput(f"--out {out}: expected a folder that is not there, is empty, or that a report has made")
+        raise BadInput(f"--out {out}: expected a new or empty folder, or one of an earlier report")
 
 
 def history_of(engine: Engine, figures: FleetFigures, since_us: int | None, until_us: int | None) -> History:

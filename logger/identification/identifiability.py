@@ -28,8 +28,8 @@ SILENT, TOGETHER, WEAK, UNEXPLAINED = "silent", "together", "weak", "unexplained
 TURNED, APART = "turned", "apart"
 NOTHING_EXACT, NOTHING_BY_DIFFERENCES = 1e-7, 1e-4
 """What counts as nothing, relative, where derivatives are exact and where they are differences."""
-NOT_ONE_ROAD = ("It is not the same road, not the same line on it, or their distances disagree by more than can be "
-                "found")
+NOT_ONE_ROAD = ("It is not the same road, not the same line on it, or their distances disagree by more than ridelog "
+                "can correct")
 # Of a direction is named what has this share of its largest change, or of the largest trace that one alone would leave.
 _PART_OF, _TRACE_OF = 0.1, 0.9
 _EQUAL, _NEARLY_EQUAL = 0.05, 0.2
@@ -71,8 +71,8 @@ def structural(names: Sequence[str], derivatives: Array, size: float, nothing: f
     lengths = np.sqrt((derivatives**2).sum(axis=0))
     heard = lengths > nothing * size
     findings = [
-        Finding(SILENT, {name: 1.0}, f"what was measured does not depend on {name}: this drive, read where the sensor "
-                f"sits, says nothing about it. Hold it fixed.")
+        Finding(SILENT, {name: 1.0}, f"the record does not depend on {name}: this drive, with the sensor where it "
+                                     "sits, cannot show it. Hold it fixed.")
         for name, one in zip(names, heard, strict=True) if not one
     ]
     kept = [name for name, one in zip(names, heard, strict=True) if one]
@@ -107,11 +107,11 @@ def statistical(names: Sequence[str], covariance: Array, weakest: Array | None =
         errors = {name: f"{deviations[names.index(name)]:.0%}" for name in shares}
         if len(shares) == 1:
             (name, error), = errors.items()
-            words = (f"this drive says nothing about {name}: its standard error would be {error} of it. Hold it fixed, "
-                     "or add runs that excite it.")
+            words = (f"this drive does not determine {name}: its standard error would be {error} of its value. Hold it "
+                     "fixed, or add runs that excite it.")
         else:
             why = "they nearly share one scale" if _one_scale(shares, _NEARLY_EQUAL) else (
-                f"{_moves(shares)} drowns in the noise")
+                f"the noise hides {_moves(shares)}")
             words = (f"this drive does not separate {_listed(list(shares))}: {why} (standard errors "
                      f"{', '.join(errors.values())}). Hold one of them fixed, or add runs that differ.")
         findings.append(Finding(WEAK, shares, words))
@@ -124,7 +124,8 @@ def unexplained(error: float) -> list[Finding]:
     if error < _EXPLAINS_NOTHING:
         return []
     return [Finding(UNEXPLAINED, {}, f"the model explains nothing of what was measured, even at its best (NRMSE "
-                    f"{error:.2f}): was it another road, or place on it, another excitation or another vehicle?")]
+                    f"{error:.2f}): check that the road, the place on it, the excitation and the vehicle are the right "
+                    "ones.")]
 
 
 def upside_down(error: float, turned_error: float) -> list[Finding]:
@@ -132,8 +133,8 @@ def upside_down(error: float, turned_error: float) -> list[Finding]:
     as ``unexplained``."""
     if turned_error > _CLEARLY_LESS * error:
         return []
-    return [Finding(TURNED, {}, f"the acceleration is upside down: the NRMSE is {error:.2f}, turned over "
-                    f"{turned_error:.2f}. Up is positive. Otherwise a step has the other sign, or another place.")]
+    return [Finding(TURNED, {}, f"the acceleration seems upside down (up is positive): the NRMSE is {error:.2f}, and "
+                                f"{turned_error:.2f} with the sign changed. Or a step has the wrong sign or place.")]
 
 
 def _together(names: Sequence[str], direction: Array, trace: Array) -> Finding:

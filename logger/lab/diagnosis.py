@@ -54,8 +54,7 @@ from logger.vehicle.named_parameters import free_parameters_of
 Progress = Callable[[str], None]
 
 ALREADY_PRESENT = "the model has it"
-LAID_BY_THE_ROAD = ("it only shifts the record, and these runs were laid where the road was felt, which takes that out "
-                    "(run.yaml says how much)")
+LAID_BY_THE_ROAD = ("ridelog extract has already shifted these runs to fit the road (run.yaml says by how much)")
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,7 +216,7 @@ def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present:
     """The search of a diagnosis and its result; arguments as of ``diagnose``."""
     obstacles = obstacles_of(posterior, effects, present)
     tried = [one for name, one in effects.items() if name not in obstacles]
-    progress("refitting the car's own numbers")
+    progress("refitting the model's parameters")
     nominal = posterior.start(present)
     unknown = UnknownNumbers() if posterior.prior.is_vague else None
     before = refit(posterior, nominal) if unknown is None else unknown.fitted(posterior, present)
@@ -322,9 +321,9 @@ def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: S
         if why is None and all(one.measures in effect.found_of for one in sensors):
             why = f"of a {' or '.join(sorted({one.measures for one in sensors}))} it is found with the rest"
         if why is None and isinstance(effect, SensorEffect) and all(run.begins_freely for run in runs):
-            why = "nothing drives the run: what a sensor does to free vibrations, another beginning of them does"
+            why = "nothing drives the run: another initial state would have the same influence as this sensor effect"
         if why is None and effect.against_ground and at_rest:
-            why = "its base rests: what acts against the ground acts against the base"
+            why = "its base is at rest: a force against the ground is also one against the base"
         if why is None and by_road and not effect.reshapes:
             why = LAID_BY_THE_ROAD
         if why is not None:

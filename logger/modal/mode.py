@@ -175,7 +175,7 @@ def _why_not(pole: complex, frequency_std_hz: float, damping_std: float, moves: 
     hum_damping, no_damping, must_have_it = 5e-4, 1e-6, 3
     hz, ratio = abs(pole) / (2 * np.pi), -pole.real / abs(pole)
     reasons = {
-        "parts of the record do not have it": not np.isfinite(frequency_std_hz),
+        "it is absent from parts of the record": not np.isfinite(frequency_std_hz),
         "it grows instead of decaying": ratio <= 0,
         "damped so heavily that it hardly swings": ratio > _MOST_DAMPING,
         "no damping to be seen: a hum, not a mode": ratio < max(no_damping, min(hum_damping, 2 * damping_std)),

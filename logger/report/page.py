@@ -62,7 +62,7 @@ FLAG_MEANINGS: Mapping[str, str] = {
     "gap": "samples of the accelerometer are missing",
     "clipped": "the accelerometer clipped, at the end of its range: the road is at least this rough",
     "frozen": "the readings of the accelerometer had not changed for half a minute of driving: no figures",
-    "repeated": "the accelerometer, or what brings its samples, gave each more than once: no figures",
+    "repeated": "the accelerometer, or its bridge, sent each sample more than once: no figures",
     "gps_late": "the GPS line was full and the fixes waited: place, speed and time may be seconds late",
     "speed_doubtful": "the speed and the places of the GPS disagree: no IRI",
     "slow": "below the speed at which the r.m.s. relation holds",
@@ -167,8 +167,8 @@ def _places_section(records: Sequence[WindowRecord], places: Sequence[RoughWindo
              "Flags")
     return doc.section("Roughest places", doc.html(
         '<div id="places">{}</div>', doc.grid(heads, rows, words=(0, 1, 2, 3, 8, 9))) + doc.hint(
-        "Each the worst window within 50 m, with its standard error. A single window of some metres is an estimate: "
-        "visit a place before judging it. Its number shows it on the map and in the curves."))
+        "Each row is the worst window within 50 m, with its standard error. One window is an uncertain estimate: visit "
+        "a place before you judge it. The map and the curves show its number."))
 
 
 def number_button(row: int, number: int) -> doc.Html:
@@ -217,7 +217,7 @@ def _notes_section(summary: DriveSummary, files: Sequence[LoggedFile]) -> doc.Ht
     if damaged:
         notes.append(_warning(f"{damaged} damaged {'line was' if damaged == 1 else 'lines were'} left out."))
     if summary.blind_s > 0:
-        notes.append(f"{span_words(summary.blind_s)} without any speed are in no distance, no map and no plot.")
+        notes.append(f"{span_words(summary.blind_s)} without any speed count in no distance, map or curve.")
     notes += [f"iri_m_per_km: {meaning}"
               for meaning in _different(_inside(file.sidecar or {}, "iri_m_per_km") for file in files)]
     notes.append(f"{counted(summary.windows, 'window')} from {counted(len(files), 'log file')}")
@@ -278,7 +278,7 @@ def _different(contents: Iterable[Any]) -> list[Any]:
 
 
 _MODES = (("iri", "Roughness"), ("comfort", "Comfort"), ("trust", "Flags"))
-_TRUST = (("0", "no flag"), ("3", "a flag, and a value"), ("x", "no value, or one that no mean includes"))
+_TRUST = (("0", "no flag"), ("3", "a flag, and a value"), ("x", "no value, or one that the means leave out"))
 
 
 def track_views(records: Sequence[WindowRecord], summary: DriveSummary, sources: str,
@@ -312,9 +312,9 @@ def _choice(drives: Sequence[str]) -> doc.Html:
 
 def _repeated_words(windows: int) -> str:
     if windows <= MOST_ROWS:
-        return "Where several drives came by, the colour is that of their mean."
-    return (f"More than {MOST_ROWS:,} windows: where several drives came by, they are drawn one over the other. Show a "
-            "single drive, or let ridelog passes average them.")
+        return "Where several drives passed, the colour shows their mean."
+    return (f"More than {MOST_ROWS:,} windows: where several drives passed, the page draws one over the other. Show a "
+            "single drive, or average them with ridelog passes.")
 
 
 def _map_view(summary: DriveSummary, sources: str, drives: Sequence[str]) -> doc.Html:
@@ -329,7 +329,7 @@ def _map_view(summary: DriveSummary, sources: str, drives: Sequence[str]) -> doc
                     'the same values."></canvas><canvas class="over" aria-hidden="true"></canvas><div class="zoom">'
                     '<button type="button" data-zoom="in" aria-label="Zoom in">+</button>'
                     '<button type="button" data-zoom="out" aria-label="Zoom out">−</button>'
-                    '<button type="button" data-zoom="all" aria-label="Show the whole way">⤢</button></div></div>'
+                    '<button type="button" data-zoom="all" aria-label="Show the whole drive">⤢</button></div></div>'
                     '{}{}<ul class="legend by-trust">{}</ul>{}{}', buttons, _choice(drives),
                     _legend("by-iri", summary.iri_classes, tuple(IRI_CLASSES), class_words),
                     _legend("by-comfort", summary.comfort, COMFORT_NAMES, comfort_words), trust, repeated,
@@ -343,18 +343,19 @@ def _curves_view() -> doc.Html:
                     'windows below holds the same values."></canvas><canvas class="over" aria-hidden="true"></canvas>'
                     "</div>") + doc.hint(
             "The shaded band is the IRI plus and minus its standard error. Where many windows share a pixel of the "
-            "picture, the line is their mean, weighted by length, the band the mean error of one window, and a grey "
-            "stroke reaches up to the worst of them. Dotted: lower limits of the IRI classes, and of discomfort "
+            "picture, the line is their mean, weighted by length, the band is the mean standard error of one window, "
+            "and a grey stroke reaches up to the worst of them. Dotted: lower limits of the IRI classes, and of "
+            "discomfort "
             "(fairly, very, extreme). The strip at the bottom: orange where a window carries a flag, grey where it has "
-            "no value that counts.")
+            "no usable value.")
 
 
 _READOUT = doc.Html(
     '<div class="readout"><div id="reading" aria-live="polite"><p class="hint">Point at a window, or tap it. Drag over '
     'the curves for the figures of a range.</p></div><div id="range" hidden><div id="figures" aria-live="polite"></div>'
     '<p class="actions"><button type="button" id="range-look">Look at it</button>'
-    '<button type="button" id="look-all">Whole way</button>'
-    '<button type="button" id="range-clear">Forget the range</button></p></div></div>')
+    '<button type="button" id="look-all">Whole drive</button>'
+    '<button type="button" id="range-clear">Clear the range</button></p></div></div>')
 
 
 def _legend(name: str, shares: Sequence[Share], names: tuple[str, ...], words_of: Callable[[str], str]) -> doc.Html:

@@ -172,7 +172,7 @@ class Repetition:
         if not self.share:
             return ""
         return (f"{100 * self.share:.0f} of 100 samples repeat the one before: no figures are made of them. Have the "
-                "sensor, or what brings its samples, send each reading once")
+                "sensor, or its bridge, send each reading once")
 
     def _judge(self, t_us: npt.NDArray[np.int64], accel_mps2: npt.NDArray[np.float64]) -> None:
         share = float((~fresh_samples(accel_mps2)[1:]).mean())

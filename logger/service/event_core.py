@@ -158,9 +158,9 @@ class EventCore:
         line, timebase = self.gps.line, self._pipeline.timebase
         late = f"its fixes come {timebase.late_us / US_PER_S:.1f} s late"
         if timebase.unsure_until_us is not None:
-            late = "nobody knows how late its fixes come, and their rows are flagged gps_late"
+            late = "the delay of its fixes is unknown, and their rows are flagged gps_late"
         elif timebase.late_us > JUMP_US:
-            late += " (rows go by the times that they name)"
+            late += " (rows use the times in the sentences)"
         if line.is_full:
             needs = f", and it has {line.needs_bytes_per_s:.0f} to send" if line.needs_bytes_per_s else ""
             return (f"its line is full: it carries {line.bytes_per_s:.0f} bytes a second{needs}, so {late}. Raise the "

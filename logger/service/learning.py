@@ -311,9 +311,9 @@ def drive_fields(alignment: DriveAlignment, config: AccelerometerConfig) -> dict
 
 def drive_words(fields: Mapping[str, Any], known: CarriedDelay) -> list[str]:
     """The same for a person, in lines; ``known``: what the rows were made with."""
-    used = f"the rows were made with {known.delay_s:.2f} s" + (f" ± {known.std_s:.2f} s" if known.std_s else "")
+    used = f"the rows used {known.delay_s:.2f} s" + (f" ± {known.std_s:.2f} s" if known.std_s else "")
     if fields["delay_s"] is None:
-        lines = [f"Receiver's delay: not known, {fields['unknown_because']}; {used}"]
+        lines = [f"GPS delay: not known, {fields['unknown_because']}; {used}"]
     else:
-        lines = [f"Receiver's delay: {fields['delay_s']:.2f} ± {fields['delay_std_s']:.2f} s by this drive; {used}"]
+        lines = [f"GPS delay: {fields['delay_s']:.2f} ± {fields['delay_std_s']:.2f} s from this drive; {used}"]
     return lines + [f"Accelerometer: {words}" for words in fields["mounting"]]

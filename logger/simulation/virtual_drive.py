@@ -453,7 +453,7 @@ def _accelerations(car: Car, passage: Passage) -> Array:
                                  f"{1000 * passage.step_s:.3g} ms")
             accel = finer if car.rubs else accel
     if not bounded([accel]):
-        raise ValueError("with its effects the car's motion grows without bound")
+        raise ValueError("with its effects the model is unstable: its motion grows without bound")
     return accel
 
 

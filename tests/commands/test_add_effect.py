@@ -92,7 +92,7 @@ def test_what_cannot_be_added(runs: list[str], tmp_path: Path) -> None:
         ("sensor_gain:gain=9000", "rav4-2009", out, "sensor_gain: expected gain of"),
         ("sensor_gain:gain=much", "rav4-2009", out, "PARAM=NUMBER"),
         ("sensor_gain", "rav4-2009", Path(runs[0]) / "drive.csv", "does not belong to a run"),
-        ("sensor_gain", "rav4-2009", tmp_path / "none" / "out.yaml", "a folder that there is"),
+        ("sensor_gain", "rav4-2009", tmp_path / "none" / "out.yaml", "a folder that exists"),
     ):
         with pytest.raises(BadInput, match=words):
             add(effect, vehicle, to, *runs)

@@ -68,7 +68,7 @@ def test_nothing_missing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> 
     assert diagnose(*write_runs(tmp_path, [])) == 0
     reported = capsys.readouterr().out
     lines = reported.splitlines()
-    assert lines[0] == "rav4-2009 on 2 runs, 36 s. 4 effects are known."
+    assert lines[0] == "rav4-2009 on 2 runs, 36 s. ridelog knows 4 effects."
     assert lines[2].startswith("Nothing is missing")
     assert "Next: nothing" in reported
     assert "roll: not tried" in reported
@@ -127,7 +127,7 @@ def test_an_effect_of_the_users_own_that_is_like_another(offset_runs: list[str],
     reported = " ".join(capsys.readouterr().out.split())
     assert "these runs cannot distinguish them" in reported
     assert "drive a smooth road" in reported  # what the file says would show it
-    assert "5 effects are known" in reported
+    assert "ridelog knows 5 effects" in reported
 
 
 def test_what_cannot_be_diagnosed(offset_runs: list[str], tmp_path: Path) -> None:

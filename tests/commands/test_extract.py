@@ -114,7 +114,7 @@ def test_without_a_line_the_distance_begins_anywhere_and_the_way_is_right(
         place: Path, drive: DemoDrive, tmp_path: Path) -> None:
     done = called("extract", place / "town.dump", "--out", tmp_path)
     assert done.returncode == 0, done.stderr
-    assert "taken out: a receiver's delay" in done.stdout
+    assert "corrected for a GPS delay" in done.stdout
     found = columns(tmp_path / "town")
     true_m = np.interp(found["t_s"] - drive.start_us / 1e6, drive.motion.time_s, drive.motion.distance_m)
     assert np.ptp(found["distance_m"] - true_m) < 3.0

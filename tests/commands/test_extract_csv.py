@@ -123,7 +123,7 @@ def test_a_phone_that_slips_is_cut_there_and_levelled_again(drive: DemoDrive, ph
     assert done.returncode == 0, done.stderr
     said = json.loads(done.stdout)
     assert [Path(one["run"]).name for one in said["runs"]] == ["ride", "ride-2"]
-    assert any("tilted" in note and "cut there" in note for note in said["notes"])
+    assert any("tilted" in note and "cut the record there" in note for note in said["notes"])
     for name in ("ride", "ride-2"):
         found = columns(tmp_path / "runs" / name)
         assert (found["accel_z_mps2"] - truth(drive, found["t_s"])).std() < 0.15

@@ -593,7 +593,7 @@ def test_a_part_whose_force_is_in_kilonewtons_is_refused_if_its_damper_is_known(
 
 
 @pytest.mark.parametrize(("spoilt", "words"), [
-    (lambda force_n: -force_n, "found it the other way round"),
+    (lambda force_n: -force_n, "found the opposite sign"),
     (lambda force_n: np.clip(force_n, -0.6, 0.4), "of them at the largest and the smallest one exactly"),
     (lambda force_n: np.where(abs(TIME_S - 5.0) < 0.5, 0.3, force_n), "found 0.3 from 4.504 to"),
 ], ids=["sign", "clipped", "stuck"])
@@ -631,7 +631,7 @@ def test_what_a_file_does_not_know_is_found(tmp_path: Path, capsys: pytest.Captu
     one = identified(capsys, part, run, "--free", "stiffness_n_per_m")
     assert set(one["parameters"]) == set(found["parameters"])
     part.write_text("name: part\nmodel: component\ndamping_n_s_per_m: 1\nstiffness_n_per_m: 2e4\n")
-    with pytest.raises(BadInput, match=r"--free: expected what to find, as .* gives every number exactly"):
+    with pytest.raises(BadInput, match=r"--free: expected the parameters to find, as .* gives all of them exactly"):
         main(["identify", "--vehicle", str(part), str(run)])
 
 

@@ -71,7 +71,7 @@ def test_for_a_person(runs: list[str], capsys: pytest.CaptureFixture[str]) -> No
     assert identify(runs, f"{MASS},{DAMPERS}", "--noise", "white") == 0
     text = capsys.readouterr().out
     for words in ("Converged in", "95 % interval", "std. error", MASS, "as white noise of 0.0",
-                  "These runs determine all that was asked.", "Best determined combination:"):
+                  "These runs determine every free parameter.", "Best determined combination:"):
         assert words in text
     several = repr(ridelog.identify("rav4-2009", runs, [MASS, DAMPERS], tries=2, low_pass_hz=20.0))
     assert "3 of 3 starts" in several and "below 20 Hz" in several
@@ -82,7 +82,7 @@ def test_a_model_that_lacks_something(runs: list[str], tmp_path: Path, capsys: p
     wrong.write_text(vehicle_file("rav4-2009").read_text("utf-8").replace("1776", "900"), "utf-8")
     assert main(["identify", *runs, "--vehicle", str(wrong), "--free", MASS, "--noise", "white"]) == 0
     text = capsys.readouterr().out
-    assert "yes, the model lacks something of the car" in text
+    assert "yes, the model lacks an effect" in text
     assert "the standard errors are a guide only" in text
 
 
@@ -137,7 +137,7 @@ def test_another_road_than_the_one_that_was_driven(runs: list[str], tmp_path: Pa
 def test_a_sensor_upside_down(runs: list[str], tmp_path: Path, more: tuple[str, ...]) -> None:
     run = other_run(runs[0], tmp_path / "turned", np.negative)
     place = ",bump.start_m,speed_scale" if more else ""
-    with pytest.raises(NotIdentifiable, match="the acceleration is upside down"):
+    with pytest.raises(NotIdentifiable, match="the acceleration seems upside down"):
         identify([f"{run}/drive.csv" if more else run], f"{MASS},{DAMPERS}{place}", *more)
     assert identify([f"{runs[0]}/drive.csv" if more else runs[0]], f"{MASS},{DAMPERS}{place}", *more) == 0
 
@@ -150,7 +150,7 @@ def test_what_speaks_against_an_estimate_is_reported(runs: list[str], tmp_path: 
     assert main(["identify", *runs, "--vehicle", str(wrong), "--free", MASS, *narrow, "--json"]) == 0
     reported = json.loads(capsys.readouterr().out)["cannot_tell"]
     assert len(reported) == 3
-    expected = (f"{MASS} ended at a bound", "are not white", "follow the road")
+    expected = (f"{MASS} ended at a bound", "are not white", "follow the input")
     for words, found in zip(expected, reported, strict=True):
         assert words in found
     assert identify(runs, MASS, *narrow) == 0
@@ -188,7 +188,7 @@ def test_a_bump_of_which_only_the_kind_is_known(runs: list[str], tmp_path: Path,
         assert reported["parameters"][name] == pytest.approx(truth, abs=4 * reported["standard_errors"][name])
     assert reported["bounds"]["run2.bump.height_m"] == [0.05, 0.2]
     assert identify(files[:1], "step.height_m", "--obstacle", "step:start_m=12,height_m=0.1", "--noise", "white") == 0
-    assert "yes, the model lacks something of the car" in capsys.readouterr().out
+    assert "yes, the model lacks an effect" in capsys.readouterr().out
 
 
 def rubbing_vehicle(folder: Path, friction_n: float) -> str:
@@ -231,7 +231,7 @@ def test_the_number_of_an_effect_beside_one_of_the_car(rubbing_run: str, tmp_pat
     text = capsys.readouterr().out
     assert f"{FRICTION} " in text
     assert "starts end at the same place" in text
-    assert "These runs determine all that was asked." in text
+    assert "These runs determine every free parameter." in text
 
 
 @pytest.mark.parametrize(("free", "more", "message"), [
@@ -291,7 +291,7 @@ def test_roads_that_were_not_measured(tmp_path: Path, capsys: pytest.CaptureFixt
     (MASS, ("--obstacle", "step:start_m=5,height_m=0"), "expected a height other than 0"),
     ("bump.height_m", (), "give it a bump or a step first"),
     ("run3.speed_scale", (), "there are 2 runs"),
-    (f"each.{MASS}", (), "expected a number of the road after each."),
+    (f"each.{MASS}", (), "expected a parameter of the road after each."),
     ("mass", (), "no parameter 'mass'; expected one of sprung_mass_kg"),
     ("", (), "expected names with commas"),
     ("front.tire_stiffness_n_per_m,both.tire_stiffness_n_per_m", (), "expected every number once"),

@@ -22,7 +22,7 @@ def plain_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.parametrize(("out", "says"), [
-    ("law.txt", r"ends in one of \.py, \.html"), ("nowhere/law.py", "a folder that there is"),
+    ("law.txt", r"ends in one of \.py, \.html"), ("nowhere/law.py", "a folder that exists"),
     ("law.html", r"the law.s file as well")])
 def test_a_name_that_is_no_law_is_refused(out: str, says: str, plain_run: Path, tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=says):

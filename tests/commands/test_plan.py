@@ -92,7 +92,7 @@ def test_runs_that_were_driven_bring_their_own_noise_and_effects(road: Path, tmp
     (("--profile", "ROAD", "--speed", "8", "--speed", "8"), "--speed 8: expected each speed once"),
     (("--profile", "ROAD", "--speed", "0"), "--speed 0: expected 0.1 to 100 m/s"),
     (("--profile", "ROAD", "--speed", "8", "--noise", "0"), "--noise 0: expected"),
-    (("--profile", "FLAT", "--speed", "8"), "expected a drive over a road that moves the car"),
+    (("--profile", "FLAT", "--speed", "8"), "expected a drive over a rough profile"),
     (("--profile", "nowhere.csv", "--speed", "8"), "nowhere.csv"),
 ])
 def test_wrong_use_is_one_line(arguments: tuple[str, ...], complaint: str, road: Path, tmp_path: Path) -> None:

@@ -152,7 +152,7 @@ def test_a_simulated_rig_is_what_the_integrator_says(bench: Path, tmp_path: Path
     kept = slice(500, len(drive) - 50)
     assert drive[kept, 1] == pytest.approx(seen.body_mps2[kept], abs=2e-3 * float(seen.body_mps2.std()))
     assert drive[kept, 2] == pytest.approx(seen.travel_m[kept], abs=2e-3 * float(seen.travel_m.std()))
-    with pytest.raises(BadInput, match="--speed: expected none of it with --excitation"):
+    with pytest.raises(BadInput, match="--speed: expected none with --excitation"):
         main(["simulate", "--vehicle", str(bench / "true.yaml"), "--excitation", str(run / "excitation.csv"),
               "--speed", "3", "--out", str(run / "other.csv")])
 
@@ -188,7 +188,7 @@ def test_clocks_of_another_rate_and_another_start_are_one_clock(bench: Path, tmp
     ("excitation.csv", "t_s,elevation_m\n0,0\n1,0\n2,0\n9,0\n", "excitation.csv:5: expected samples evenly"),
     ("excitation.csv", "t_s,elevation_m\n0,0\n1,nan\n2,0\n3,0\n", "excitation.csv:3: expected a number for elevation"),
     ("excitation.csv", "t_s,elevation_m\n70,0\n71,0\n72,0\n73,0\n", "expected times of the same clock as in drive.csv"),
-    ("excitation.csv", "t_s,elevation_m\n0,0\n9,0\n18,0\n27,0\n", "expected an excitation that moves the car"),
+    ("excitation.csv", "t_s,elevation_m\n0,0\n9,0\n18,0\n27,0\n", "expected an excitation that moves the rig"),
     ("excitation.csv", "t_s,elevation_m\n0,0\n1,1\n2,0\n3,0\n", "expected 5 s .* while its excitation lasts"),
     ("drive.csv", "t_s,accel_mps2\n0,0\n1,0\n", "drive.csv:1: expected a header with t_s,accel_z_mps2\\["),
     ("profile.csv", "distance_m,elevation_m\n0,0\n1,0\n", "expected profile.csv or excitation.csv, found both"),

@@ -102,6 +102,6 @@ def test_segments_of_few_cars_are_withheld(dataset: Path, tmp_path: Path, capsys
 
 def test_a_folder_with_other_files_is_not_taken(dataset: Path, tmp_path: Path) -> None:
     (tmp_path / "mine.txt").write_text("mine")
-    with pytest.raises(BadInput, match="expected a folder that is not there, is empty, or that a report has made"):
+    with pytest.raises(BadInput, match="expected a new or empty folder, or one of an earlier report"):
         main(["fleet", "report", str(dataset), "--out", str(tmp_path)])
     assert (tmp_path / "mine.txt").read_text() == "mine"

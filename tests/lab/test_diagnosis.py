@@ -116,7 +116,7 @@ def test_what_is_missing_is_named_with_its_numbers_and_errors(offset: LabDiagnos
 
 def test_errors_on_what_no_fit_saw_fall_on_the_way(offset: LabDiagnosis) -> None:
     words = [step.words for step in offset.steps]
-    assert words == ["the vehicle as its file says", "its parameters refitted", "with sensor_offset"]
+    assert words == ["the vehicle's file unchanged", "its parameters refitted", "with sensor_offset"]
     before, refitted, after = (step.error for step in offset.steps)
     assert before == pytest.approx(offset.baseline_error, rel=1e-4)  # which is simulated finely
     assert before > refitted > 2 * after
@@ -223,5 +223,5 @@ def test_effects_that_the_runs_would_hide_are_reported(flawless: SimulatedRuns) 
 def test_progress_is_reported(flawless: SimulatedRuns) -> None:
     reported: list[str] = []
     diagnose(posterior_of(flawless), {"sensor_gain": EFFECTS["sensor_gain"]}, progress=reported.append)
-    assert reported[0] == "refitting the car's own numbers" and "round 1" in reported
+    assert reported[0] == "refitting the model's parameters" and "round 1" in reported
     assert reported[-1] == "what these runs could not show"

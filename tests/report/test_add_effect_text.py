@@ -52,7 +52,7 @@ def test_an_effect_that_helps_is_said_to_with_its_numbers() -> None:
 def test_what_is_removed_is_said_before_the_effect() -> None:
     drift = Drift("drive", OFFSET, 0.3, None, np.zeros(100), 100.0)
     found = replace(FOUND, removed=replace(AS_USUAL, drifts=(drift,), drift_share=0.4))
-    assert judgement(found)[0].startswith("The sensor drifts (a constant offset of 0.3 m/s2). The drift has nothing ")
+    assert judgement(found)[0].startswith("The sensor drifts (a constant offset of 0.3 m/s2). The motion does ")
     assert addition_json(found)["removed"]["drift"]["error_power_share"] == 0.4
 
 
@@ -95,7 +95,7 @@ def test_the_number_that_was_biased_most_is_reported_with_how_wrong_it_was() -> 
 
 def test_where_nothing_was_biased_that_is_said() -> None:
     assert bias(FOUND.names, [STILL]) == (
-        "dry_friction moved no parameter of the car by more than 2 standard errors.")
+        "dry_friction moved no parameter of the model by more than 2 standard errors.")
 
 
 def test_the_rows_fit_their_heads_and_mark_what_was_biased() -> None:

@@ -63,9 +63,9 @@ def shape() -> Shape:
 def test_nothing_is_missing_where_there_is_no_more_than_noise() -> None:
     nothing, errors = diagnosis_summary(NOTHING)
     assert nothing.startswith("Nothing is missing: ")
-    assert errors == ("NRMSE on held-out stretches: 0.310 (fit 69.0 %) as the vehicle's file says, 0.152 (fit 84.8 %) "
-                      "with its parameters refitted. Noise floor: about 0.150 (fit 85.0 %). Share of the measured "
-                      "power explained: 98% with the parameters refitted.")
+    assert errors == ("NRMSE on held-out stretches: 0.310 (fit 69.0 %) with the vehicle's file unchanged, 0.152 "
+                      "(fit 84.8 %) with its parameters refitted. Noise floor: about 0.150 (fit 85.0 %). Share of "
+                      "the measured power explained: 98% with the parameters refitted.")
     assert looks_like(NOTHING) == untested(NOTHING) == []
 
 
@@ -75,16 +75,16 @@ def test_what_is_missing_is_said_with_its_numbers_and_how_probable_noise_is() ->
                        "transition_velocity_m_per_s 0 m/s. p-value (probability that noise alone looks like any known "
                        "effect): below 1e-9.")
     assert "0.153 (fit 84.7 %) with dry_friction. Noise floor: about 0.150 (fit 85.0 %). " in errors
-    assert errors.endswith("explained: 94% with the parameters refitted, 98% in the end.")
+    assert errors.endswith("explained: 94% with the parameters refitted, 98% finally.")
     reach = diagnosis_summary(replace(FOUND, best_linear=0.962))[1]
-    assert reach.endswith("A linear car could explain 96% at most.")
+    assert reach.endswith("No linear model can explain more than 96%.")
     assert diagnosis_json(FOUND)["explained_power"] == {
         "refitted": pytest.approx(1 - 0.25**2), "final": pytest.approx(1 - 0.153**2), "best_linear": None}
 
 
 def test_a_signal_that_contradicts_the_others_is_named() -> None:
     (off,) = (one for one in diagnosis_summary(replace(FOUND, signals_off={"travel_m": 0.052})) if "travel_m" in one)
-    assert off.startswith("travel_m reads +5.2% against what all other signals say")
+    assert off.startswith("travel_m is +5.2% off against all other signals")
     left = replace(FOUND, excess=3.0, excess_of={"": 0.0, "travel_m": 3.0})
     assert any(one.startswith("It is in travel_m alone") for one in diagnosis_summary(left))
     everywhere = replace(left, excess_of={"": 0.5, "travel_m": 3.0})
@@ -102,10 +102,10 @@ def test_what_calibrated_sensors_may_leave_above_their_noise_is_said_too() -> No
     missing, left, *_ = diagnosis_summary(replace(FOUND, over_noise=0.5))
     assert missing.startswith("dry_friction is missing")
     assert left == ("Something more may be missing that no known effect explains: in the worst run the residual is 1.5 "
-                    "times the sensor's noise. Beyond that noise it is less than 0.1% of the measured power, as "
-                    "calibrated sensors may leave.")
+                    "times the sensor's noise. Beyond that noise it is less than 0.1% of the measured power, no "
+                    "more than calibration errors cause.")
     nothing, *_ = diagnosis_summary(replace(NOTHING, over_noise=0.5))
-    assert nothing.endswith("the residual is hardly more than calibrated sensors may leave.")
+    assert nothing.endswith("the residual is hardly more than calibration errors of the sensors.")
 
 
 def test_what_no_candidate_explains_is_said_and_so_are_imitations_that_are_not_named() -> None:
@@ -140,7 +140,7 @@ def test_what_the_tolerance_absorbed_is_said_with_its_error_and_what_does_the_sa
         EFFECTS["payload"], {"mass_kg": 108.05}))
     _, moved, same, _ = diagnosis_summary(found)
     assert "sprung_mass_kg by +10.4% ± 1.4%" in moved and "Measure one of them" in moved
-    assert same.startswith("payload (") and "mass_kg 108 kg) would move all of them in this way" in same
+    assert same.startswith("payload (") and "mass_kg 108 kg) would bias all of them in this way" in same
     assert diagnosis_json(found)["parameter_shifts"] == {"sprung_mass_kg": {"share": 0.104, "standard_error": 0.014}}
     assert diagnosis_json(found)["shift_explained_by"] == {"effect": "payload", "parameters": {"mass_kg": 108.05}}
 
@@ -148,7 +148,7 @@ def test_what_the_tolerance_absorbed_is_said_with_its_error_and_what_does_the_sa
 def test_parameters_that_the_file_leaves_open_are_said_as_they_were_fitted() -> None:
     found = replace(NOTHING, left_open={"stiffness_n_per_m": (2100.4, 1.4), "mass_kg": (2.45, 0.02)})
     fitted = diagnosis_summary(found)[1]
-    assert fitted == ("Parameters that were left open, as fitted: stiffness_n_per_m 2100.4 ± 1.4 N/m "
+    assert fitted == ("Fitted parameters that the vehicle's file leaves open: stiffness_n_per_m 2100.4 ± 1.4 N/m "
                       "and mass_kg 2.45 ± 0.02 kg.")
     assert diagnosis_json(found)["fitted_parameters"]["mass_kg"] == {"value": 2.45, "standard_error": 0.02}
 
@@ -162,8 +162,8 @@ def test_what_explains_as_well_is_named_with_the_drives_that_would_separate_them
     alike = replace(FRICTION, confused_with=("damper_blow_off", "sensor_gain"))
     found = replace(FOUND, candidates=(alike, *OTHERS))
     verdict, drives, *_ = diagnosis_summary(found)
-    assert verdict.startswith("One of dry_friction, damper_blow_off or sensor_gain is missing; these runs cannot "
-                              "distinguish them. If dry_friction (")
+    assert verdict.startswith("Either dry_friction, damper_blow_off or sensor_gain is missing; these runs cannot "
+                              "distinguish them. If it is dry_friction (")
     assert drives.startswith("dry_friction, damper_blow_off and sensor_gain explain the residual about equally well. ")
     for name in ("dry_friction", "damper_blow_off", "sensor_gain"):
         assert f"{name}: {EFFECTS[name].shown_by}" in drives
@@ -176,15 +176,15 @@ def test_what_explains_as_well_is_named_with_the_drives_that_would_separate_them
 def test_what_is_nearly_named_is_said_with_the_drive_that_would_show_it() -> None:
     near = candidate("sensor_gain", 0.008, 15.6)
     *_, said = diagnosis_summary(replace(NOTHING, candidates=(near, OTHERS[0])))
-    assert said == ("sensor_gain is nearly named: noise alone looks like it in 0.8% of such searches (0.1% allowed). "
-                    f"To tell: {EFFECTS['sensor_gain'].shown_by}.")
-    assert not any("nearly named" in one for one in (*diagnosis_summary(NOTHING), *diagnosis_summary(FOUND)))
+    assert said == ("sensor_gain just misses the threshold: noise alone looks like it in 0.8% of such searches, "
+                    f"and ridelog allows 0.1%. To find out: {EFFECTS['sensor_gain'].shown_by}.")
+    assert not any("misses the threshold" in one for one in (*diagnosis_summary(NOTHING), *diagnosis_summary(FOUND)))
 
 
 def test_what_was_added_and_dropped_again_is_named() -> None:
     steps = (*FOUND.steps[:2], ErrorStep("with tire_damping", 0.2), *FOUND.steps[2:])
     assert diagnosis_summary(replace(FOUND, steps=steps))[-1] == (
-        "Tried and dropped: tire_damping (the others explain the same, or it explains little beside what is unknown).")
+        "Tried and dropped: tire_damping (the effects above explain the same, or it explains little of what is left).")
     assert not any("dropped" in one for one in diagnosis_summary(FOUND))
 
 

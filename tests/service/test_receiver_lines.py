@@ -80,7 +80,7 @@ def test_a_full_line_is_reported_with_what_to_do() -> None:
     for event in events:
         core.feed(event)
     assert "carries 960 bytes a second, and it has" in core.gps_doubt
-    assert "late (rows go by the times that they name)" in core.gps_doubt
+    assert "late (rows use the times in the sentences)" in core.gps_doubt
     assert "Raise the baud rate" in core.gps_doubt
     sends = float(core.gps_doubt.split("it has ")[1].split()[0])
     texts = rmc_gga_and(14)(datetime(2026, 5, 4), 0.0)

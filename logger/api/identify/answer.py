@@ -156,7 +156,7 @@ def answer(question: IdentifyQuestion) -> Identification:
               for one in given]
     records = _records(drives, question, model.vehicle)
     if question.free is None and (question.road != MEASURED or question.obstacles):
-        raise question.wrong("free", ": expected what to find, as the road was not measured")
+        raise question.wrong("free", ": expected the parameters to find, as the road was not measured")
     if question.road != MEASURED:
         return _on_unmeasured_roads(model, records, question)
     return _on_measured_roads(model, records, _narrowed(question, drives))
@@ -259,8 +259,8 @@ def _with_unknown_numbers(given: vehicle_file.CarModel, word: str, records: Sequ
     named = {one.replace(f"{BOTH}.", f"{axle}.") for one in free for axle in AXLES}
     free += [name for name, one in known.items() if one.words == UNKNOWN and name not in named]
     if not free and question.free is None:
-        raise question.wrong("free", f": expected what to find, as {word} gives every number exactly (875 +- 5% or "
-                             "unknown in place of 875 says that one is not)")
+        raise question.wrong("free", f": expected the parameters to find, as {word} gives all of them exactly (or "
+                                     "write 875 +- 5%, or unknown, for one in the file)")
     bounds = {name: one.ends for name, one in known.items() if name in free and one.ends} | dict(question.bounds or {})
     if PRELOAD in free:  # as large as what was measured, either way
         most_n = max(float(np.abs(record.measured_mps2).max()) for record in records)
@@ -268,16 +268,9 @@ def _with_unknown_numbers(given: vehicle_file.CarModel, word: str, records: Sequ
     return replace(question, free=free, bounds=bounds)
 
 
-_RIG_WORDS = {"follow the road": "follow the excitation", "of the car or of the road": "of the rig",
-              "something of the car": "something of the rig"}
-
-
 def _in_words_of(records: Sequence[Record], line: str) -> str:
-    """A line for a person, with the unit that was measured, and of rigs without roads."""
-    words = {"m/s2": records[0].facts.main.unit, **(_RIG_WORDS if records[0].timed else {})}
-    for one, other in words.items():
-        line = line.replace(one, other)
-    return line
+    """A line for a person, with the unit that was measured."""
+    return line.replace("m/s2", records[0].facts.main.unit)
 
 
 def _beside_beginnings(records: Sequence[Record]) -> tuple[LeftOut, ...]:
@@ -351,8 +344,8 @@ def _free(given: vehicle_file.CarModel, road: RoadInput, found: Mapping[str, flo
     starts and bounds that do not fit."""
     free = question.free or ()
     if cars := [name for name in free if name.startswith(f"{EACH}.") and not is_input(name)]:
-        raise question.wrong("free", f" {cars[0]}: expected a number of the road after {EACH}., as all runs have one "
-                                     "car")
+        raise question.wrong("free", f" {cars[0]}: expected a parameter of the road after {EACH}., as all runs share "
+                                     "one car")
     names = [one for name in free for one in expanded(name, runs)]
     if not names or len(set(names)) < len(names):
         raise question.wrong("free", f" {','.join(free)}: expected names with commas between them, each once")
@@ -465,7 +458,7 @@ def _road_options(question: IdentifyQuestion) -> tuple[RoadOptions, IdentifyQues
 def _head(given: vehicle_file.CarModel, free: int, records: Sequence[Record], more: str, stop: str = ";") -> str:
     vehicle, runs = given.vehicle, "1 run" if len(records) == 1 else f"{len(records)} runs"
     begun = (f"the first {records[0].skip_s:g} s of a run left out" if records[0].skip_s else
-             "nothing drives it: the state that a run begins in is found with the rest")
+             "nothing drives it: identify estimates the initial state as well")
     return (f"{vehicle.name} ({vehicle.model.replace('_', ' ')}): {free} free, {runs}, "
             f"{sum(len(one.kept_mps2) for one in records)} samples at {records[0].rate_hz:.5g} Hz{more}{stop} {begun}")
 
@@ -515,8 +508,8 @@ def doubts(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
         yield (f"residuals are not white (p = {white.p_value:.2g}): the noise model is incomplete, and the standard "
                "errors are a guide only.")
     if not free_of_road.passed:
-        yield (f"residuals follow the road (p = {free_of_road.p_value:.2g}): the model lacks something of the car or "
-               "of the road, and the estimates are biased by it.")
+        yield (f"residuals follow the input (p = {free_of_road.p_value:.2g}): the model lacks an effect, "
+               "which biases the estimates.")
 
 
 def _p_value(test: Test) -> float | None:
@@ -536,7 +529,7 @@ def measured_lines(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
     """What a person reads."""
     steps = f"{fit.iterations} steps"
     yield (f"Converged in {steps}." if fit.converged else
-           f"NOT CONVERGED in {steps}: do not use these values; try other starts (--start) or fewer numbers.")
+           f"NOT CONVERGED in {steps}: do not use these values; start nearer (--start), or free fewer parameters.")
     if len(fit.ends) > 1:
         yield _ends(fit)
     yield (f"NRMSE, rms(measured - model) / rms(measured): {fit.error_before:.4f} before, "
@@ -558,8 +551,8 @@ def common_words(model: DriveModel, common: CommonRoughness) -> Iterator[str]:
                f"does not contain. The standard errors count that; they are up to {common.growth:.2f} times those of "
                "runs over roads of their own.")
     elif may_have_common(model) and common.fit.noise.name != "road":
-        yield (f"If these {runs} runs are over one and the same place, the error of its profile is the same in all of "
-               f"them: then standard errors are up to {np.sqrt(runs):.2f} times those above.")
+        yield (f"If these {runs} runs are over the same stretch, they share the error of its profile: true standard "
+               f"errors are then up to {np.sqrt(runs):.2f} times those above.")
 
 
 def record_words(found: ReadingsFit) -> Iterator[str]:
@@ -581,7 +574,7 @@ def _ends(fit: Fit) -> str:
     scale = np.array([fit.standard_errors[one.name] for one in fit.free])
     best = fit.ends[np.argmin(np.abs((fit.ends - np.array(list(fit.parameters.values()))) / scale).max(axis=1))]
     same = int((np.abs((fit.ends - best) / scale).max(axis=1) < 1.0).sum())
-    return f"{same} of {len(fit.ends)} starts end at the same place; the best of all is taken."
+    return f"{same} of {len(fit.ends)} starts end at the same place; these are the best values."
 
 
 def _table(fit: Fit) -> Iterator[str]:
@@ -616,15 +609,16 @@ def _checks(white: Test, free_of_road: Test) -> Iterator[str]:
     if not white.degrees and not free_of_road.degrees:
         yield "There is no residual to test."
     if free_of_road.degrees:
-        yield (f"Do residuals follow the road? p = {free_of_road.p_value:.2g} over {free_of_road.degrees} degrees of "
+        yield (f"Do residuals follow the input? p = {free_of_road.p_value:.2g} over {free_of_road.degrees} degrees of "
                "freedom: " + ("no." if free_of_road.passed else
-                              "yes, the model lacks something of the car, and the estimates are biased by that."))
+                              "yes, the model lacks an effect, which biases the estimates."))
 
 
 def _measured_limits(fit: Fit, sound: bool) -> Iterator[str]:
     if fit.at_bound:
         yield (f"At a bound: {', '.join(fit.at_bound)}. The bound stopped the fit there; it is not a measured "
-               "value, and its standard error means nothing. Widen --bounds, or ask what the model lacks.")
+               "value, and its standard error means nothing. Widen --bounds, or run ridelog compare: the model may "
+               "lack an effect.")
         if fit.noise.name != "white":
             yield ("Coloured noise can absorb what the model lacks, most of all in a sweep, which has one frequency "
                    "at a time: try --noise white.")
@@ -635,7 +629,7 @@ def _measured_limits(fit: Fit, sound: bool) -> Iterator[str]:
         listed = ", ".join(f"{name} ({share:.0%})" for name, share in vague.items())
         yield f"Poorly determined by these runs: {listed}."
     elif sound:
-        yield "These runs determine all that was asked."
+        yield "These runs determine every free parameter."
     if len(fit.parameters) > 1:
         yield _least_known(fit)
 
@@ -675,7 +669,8 @@ def unmeasured_json(fit: RoadFit, free: Sequence[Free]) -> dict[str, Any]:
 def unmeasured_lines(fit: RoadFit, free: Sequence[Free]) -> Iterator[str]:
     """What a person reads."""
     yield (f"Converged in {fit.iterations} steps." if fit.converged else
-           f"NOT CONVERGED in {fit.iterations} steps: do not use these values; start nearer (--start) or free less.")
+           f"NOT CONVERGED in {fit.iterations} steps: do not use these values; start nearer (--start), or free fewer "
+           "parameters.")
     yield (f"NRMSE over the most probable road, rms(residual) / rms(measured): {fit.error_before:.4f} before, "
            f"{fit.error_after:.4f} after.")
     yield ""

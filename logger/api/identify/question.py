@@ -99,18 +99,19 @@ class IdentifyQuestion(question.LongQuestion):
         "where to start instead of the vehicle's value; may repeat", metavar="PARAM=VALUE", read=_number,
         many=dict)] = None
     bounds: Annotated[Mapping[str, tuple[float, float]] | None, question.Option(
-        "where to stay, sizes above 0 (default: within a factor of 20, lengths 3); may repeat",
+        "range to search, above 0 for sizes (default: a factor of 20 either way, 3 for lengths); may repeat",
         metavar="PARAM=LOW,HIGH", read=_interval, many=dict)] = None
     obstacles: Annotated[Mapping[str, Mapping[str, float]] | None, question.Option(
         "what lies on the road [m]; may repeat. bump: height_m, width_m; step, up or with a negative height down: "
-        "height_m. Without start_m it is looked for; its numbers are free as bump.height_m ... In Python: "
+        "height_m. Without start_m, identify searches for it; --free takes its parameters as bump.height_m ... In "
+        "Python: "
         '{"bump": {"height_m": 0.1, "width_m": 3.0}}', metavar="NAME:PARAM=VALUE,...", read=_obstacle, many=dict,
         flag="--obstacle")] = None
     noise: Annotated[str, question.Option(
         "model of the residual: white (output error), ar (innovations form), road (roughness that the profile does "
         "not contain, through the car); auto: the likeliest", choices=question.NOISE_MODELS)] = "auto"
     low_pass_hz: question.LowPass = None
-    tries: Annotated[int, question.InPython("so many further starts, spread around", question.TRIES)] = 0
+    tries: Annotated[int, question.InPython("number of further starting points, spread around", question.TRIES)] = 0
     road: Annotated[str, question.Switches(
         "measured: with its profile; unmeasured: each run has a road of its own, of the waviness; same: all are over "
         "one", choices=(MEASURED, UNMEASURED, SAME), by_value={

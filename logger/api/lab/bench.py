@@ -153,7 +153,7 @@ class Bench:
             return chosen(effect, values)
         with self.blamed():
             posterior = self.posterior(searches=True)
-            notify("refitting the car's own numbers")
+            notify("refitting the model's parameters")
             nominal = posterior.start(self.model.effects)
             seen = misalignment(posterior, nominal)
             base = refit(posterior, nominal)
@@ -166,7 +166,7 @@ class Bench:
 
     def added(self, start: Chosen, candidates: int, notify: Notify = silent) -> AddedEffects:
         """The effect fitted with the car's numbers on all of the runs, from the best of so many ``candidates``."""
-        notify(f"fitting the car without and with {start.effect.name}")
+        notify(f"fitting the model without and with {start.effect.name}")
         with self.blamed():
             return add(self.posterior(), self.model.effects, [self.filed(start)], candidates)
 

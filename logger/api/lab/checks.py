@@ -110,8 +110,8 @@ def check_moves(word: str, model: CarModel, runs: SimulatedRuns) -> list[Array]:
     predictions = predicted(word, model, runs, model.effects)
     if not any(map(_moves, runs.runs, predictions)):
         raise BadInput(f"{runs.runs[0].name}: expected " + (
-            "an excitation that moves the car; it is flat while the record lasts" if runs.runs[0].timed else
-            "a drive over a road that moves the car; where it was the profile is flat, or it stood still"))
+            "an excitation that moves the rig; it is flat while the record lasts" if runs.runs[0].timed else
+            "a drive over a rough profile; the profile is flat where the car drove, or the car stood still"))
     return predictions
 
 
@@ -131,7 +131,7 @@ def predicted(word: str, model: CarModel, runs: SimulatedRuns, effects: Sequence
         raise BadInput(f"{word}: {error}") from None
     if not bounded(predictions):
         names = " and ".join(one.effect.name for one in effects)
-        raise BadInput(f"{word}: with {names} the car's motion grows without bound")
+        raise BadInput(f"{word}: with {names} the model is unstable: its motion grows without bound")
     return predictions
 
 
@@ -255,9 +255,9 @@ def _other_roads(runs: SimulatedRuns, followed: _Followed, car: Car) -> Iterator
         found, run = followed.around[k], runs.runs[k]
         if run.timed and _is_coherent(run, car):
             continue
-        what = "a record of what its excitation does" if run.timed else "a drive over the road of its profile"
-        yield (f"{run.name}: expected {what}, found one that does not follow it (correlation {found.correlation:.2f} "
-               f"around the body's bounce, by chance up to {found.chance:.2f}): {_advice(run, car, followed.band_hz)}")
+        what = "a record that follows its excitation" if run.timed else "a drive that follows the road of its profile"
+        yield (f"{run.name}: expected {what}, found one that does not (correlation {found.correlation:.2f} around the "
+               f"body's bounce; chance gives up to {found.chance:.2f}): {_advice(run, car, followed.band_hz)}")
 
 
 def _is_coherent(run: Run, car: Car) -> bool:
@@ -275,10 +275,10 @@ def _another_car(word: str, model: CarModel, runs: SimulatedRuns, predictions: S
     if found is not None and not _explained_by_an_effect(found, model, known, numbers):
         far = list(found.shares.items())[:_NAMED]
         more = f" and {len(found.shares) - _NAMED} more numbers far off" if len(found.shares) > _NAMED else ""
-        yield (f"{runs.runs[0].name}: expected a drive of the car in {word}, found one of another car: this one says "
-               f"next to nothing of it (error {found.error:.2f}), one with "
+        yield (f"{runs.runs[0].name}: expected a drive of the car in {word}, found one of another car: the file's "
+               f"model explains next to nothing of it (NRMSE {found.error:.2f}), a model with "
                f"{', '.join(f'{name} {share:+.0%}' for name, share in far)}{more} leaves {found.found_error:.2f}. "
-               "Is it another car's file? ridelog identify fits a car's numbers"
+               "Is this the right vehicle file? ridelog identify fits a model's parameters"
                + ("" if COMPILED else "; effects that are forces were not tried, which takes the lab extra"))
 
 
@@ -301,10 +301,10 @@ def _advice(run: Run, car: Car, band_hz: tuple[float, float]) -> str:
 
     found = better_placement(run, predict, band_hz, (track.start_m, track.end_m))
     if found is None:
-        return "it fits nowhere on it. Is it the profile of another road, or another drive's record?"
+        return "the record fits nowhere on the profile. Does one of them belong to another road?"
     if found.backwards:
-        return "it follows the profile read backwards. Was it driven in the other direction?"
-    return f"it fits about {found.farther_m:+.0f} m farther along. Do distances begin where the profile does?"
+        return "the record follows the profile read backwards. Was the road driven in the other direction?"
+    return f"the record fits the profile {found.farther_m:+.0f} m farther along. Do both begin at the same place?"
 
 
 _SAME_RATE = 1e-3  # times that are written to a millisecond leave the rate of a few seconds so uncertain
@@ -439,8 +439,8 @@ def check_decay(drive: Drive, file: Path) -> None:
         half = len(drive.accel_z_mps2) // 2
         first, last = (float(part.std()) for part in (drive.accel_z_mps2[:half], drive.accel_z_mps2[half:]))
         if last > _DIES_DOWN * first:
-            raise BadInput(f"{file}: expected an excitation that moves the car, or a record that dies down, as of what "
-                           f"is let go: nothing drives it, and its second half has {last / max(first, 1e-300):.2g} "
+            raise BadInput(f"{file}: expected an excitation that moves the rig, or a free decay: nothing drives this "
+                           f"record, yet its second half has {last / max(first, 1e-300):.2g} "
                            "times the r.m.s. of the first")
 
 
@@ -472,12 +472,12 @@ def check_channels(drive: Drive, file: Path, vehicle: Vehicle) -> None:
     part = track.moves_part and main.measures == "force"
     alone = vehicle.model == "single_mass" and track.acts_on == (("body",),) and main.measures in _ORDERS
     if part and goes_against(drive.accel_z_mps2, then(track.elevation_m), 0, range(2), drive.rate_hz):
-        raise BadInput(f"{file}: {main.name}: expected what the part pulls back with, positive where it is longer, "
-                       "found it the other way round: turn the sign of the force or of displacement_m")
+        raise BadInput(f"{file}: {main.name}: expected the force that pulls the part back, positive when it is longer, "
+                       "found the opposite sign: change the sign of the force or of displacement_m")
     if alone and track.force_n is not None and goes_against(
             then(track.force_n[:, 0]), drive.accel_z_mps2, _ORDERS[main.measures], range(3), drive.rate_hz):
-        raise BadInput(f"{file}: {main.name}: expected it to go with {track.forces[0].name}, found it against that "
-                       "force: turn the sign of one of them (both are positive up)")
+        raise BadInput(f"{file}: {main.name}: expected it to follow {track.forces[0].name}, found the opposite sign: "
+                       "change the sign of one of them (both are positive up)")
 
 
 def driven_parts(drive: Drive, on_rig: Bools | None = None) -> list[slice]:

@@ -191,7 +191,7 @@ def headline(found: LabComparison) -> list[str]:
     plain, refitted = found.plain, found.refitted
     residual, measured = (rms(one) for one in (plain.residuals.residual, plain.residuals.measured))
     unit = plain.residuals.unit
-    lines = [f"NRMSE {plain.error:.3f} (residual over measured): {residual:.3g} of {measured:.3g} {unit} r.m.s."]
+    lines = [f"NRMSE {plain.error:.3f} (residual {residual:.3g} over measured {measured:.3g} {unit} r.m.s.)."]
     refit = "A refit of masses, springs, dampers and distances within their tolerance"
     if any(one.effect.parameters for one in found.effects):
         refit += ", and of the effects' parameters,"
@@ -622,7 +622,7 @@ def bias(names: Sequence[str], moved: Sequence[Number]) -> str:
     together = " and ".join(names)
     biased = [one for one in moved if one.biased]
     if not biased:
-        return f"{together} moved no parameter of the car by more than {BIAS_SIGMA:g} standard errors."
+        return f"{together} moved no parameter of the model by more than {BIAS_SIGMA:g} standard errors."
     listed = ", ".join(one.name for one in biased[:_NAMED])
     more = f" and {len(biased) - _NAMED} more" if len(biased) > _NAMED else ""
     worst = biased[0]

@@ -160,7 +160,7 @@ def _compared(bench: Bench) -> str:
     seconds = sum((run.count - run.first) / run.rate_hz for run in runs)
     has = f", with {', '.join(one.effect.name for one in model.effects)}," if model.effects else ""
     return (f"{model.vehicle.name}{has} on {len(runs)} run{'s' * (len(runs) != 1)}, {seconds:.0f} s. "
-            f"{len(bench.effects)} effects are known.")
+            f"ridelog knows {len(bench.effects)} effects.")
 
 
 def _next(question: DiagnoseQuestion, bench: Bench, found: LabDiagnosis) -> str:
@@ -169,16 +169,16 @@ def _next(question: DiagnoseQuestion, bench: Bench, found: LabDiagnosis) -> str:
         command = question.command(f"add-effect {bench.files.get(one, one)} {{}} --out with-{one}.yaml")
         if not others:
             return f"Next: {command}"
-        return wrapped([f"Next: add {enumerated([one, *others], 'and')} one after the other. What is fitted before all "
-                        f"are in is biased by the others."]) + f"\n{command}"
+        return wrapped([f"Next: add {enumerated([one, *others], 'and')} one after the other. Until all are in the "
+                        "file, those still missing bias each fit."]) + f"\n{command}"
     if found.beyond and not found.exceeds_noise:
-        words = (f"Next: see whether {', '.join(found.beyond)} of the vehicle's file can be right. From the runs "
-                 "alone they are found by")
+        words = (f"Next: check {', '.join(found.beyond)} in the vehicle's file. This command fits them to the runs "
+                 "alone:")
         return wrapped([words]) + "\n" + question.command(f"identify --free {','.join(found.beyond)} {{}}")
     if found.unexplained:
         return wrapped(["Next: look at the shape above. An effect of your own is one Python file (--effect-file); "
                            "ridelog compare shows where the residual is."])
-    return "Next: nothing. A drive that shows what these runs cannot tell would test the model further."
+    return "Next: nothing. Runs that excite the effects listed as undetected would test the model further."
 
 
 # --- without a profile ---
@@ -326,7 +326,7 @@ def _diagnosed(model: Model, records: Sequence[Record], question: DiagnoseQuesti
     effects, _ = known_effects(model, list(map(str, question.effect_files)))
     try:
         if by_receiver := any(one.facts.places_by == BY_RECEIVER for one in records):
-            notify("laying the drives on one distance by the road that they felt")
+            notify("aligning the drives by the road that they felt")
             records = placed_by_road(records, given, off, model.effects, model.vehicle)
         problem = SameRoad(records, given, off, model.vehicle, exact_places=not by_receiver)
         return diagnosis.diagnose_same_road(problem, among(effects, question.candidates), model.effects, notify)
@@ -346,43 +346,43 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
     """What is missing, how certain that is, and what it could be instead: paragraphs."""
     lines = [*removed_words(found.removed, found.band)]
     if found.contradicted:
-        lines.append(f"The runs contradict the vehicle's file, by {enumerated(found.contradicted, 'and')}. The search "
-                     "therefore took its parameters as unknown, except those with a stated tolerance.")
+        lines.append(f"The runs contradict the vehicle's file in {enumerated(found.contradicted, 'and')}. The search "
+                     "therefore treated its parameters as unknown, except those with a stated tolerance.")
     for one, group in zip(found.missing, groups(found), strict=True):
         lines += [_missing(found, one), *([_confusion(group, found)] if len(group) > 1 else [])]
     if not found.missing and not found.unexplained:
         more = " else" * bool(found.removed.drifting_sensors or found.removed.distance_error_m > 0)
         what, how = ("No effect", "") if found.beyond else (f"Nothing{more}", " within their tolerance")
-        most = "calibrated sensors may leave" if found.within_calibration else "the sensor's noise"
-        lines.append(f"{what} is missing: with the car's parameters refitted{how}, the residual is hardly more than "
+        most = "calibration errors of the sensors" if found.within_calibration else "the sensor's noise"
+        lines.append(f"{what} is missing: with the model's parameters refitted{how}, the residual is hardly more than "
                      f"{most}.")
     if found.coloured and not found.exceeds_noise:
-        lines.append("The sensor's noise is coloured (louder at some frequencies). It is as loud when the car shakes "
-                     "little as when it shakes much, so it does not come from the road.")
+        lines.append("The sensor's noise is coloured (louder at some frequencies). It is equally loud at small and at "
+                     "large motion, so the motion does not cause it.")
     if found.exceeds_noise:
         lines.append(_left_over(found, "is", found.excess) + ".")
         if found.contradicted_by:
-            lines.append(f"It is in {enumerated(found.contradicted_by, 'and')} alone: the other signals are explained "
-                         "to their noise. Check that sensor: its place, its sign, its filter.")
+            lines.append(f"It appears only in {enumerated(found.contradicted_by, 'and')}; the model explains the other "
+                         "signals down to their noise. Check that sensor: its place, its sign, its filter.")
         if any(one.p_value < FALSE_ALARM and one.effect.name not in found.verdict for one in found.candidates):
             lines.append(f"Effects that improve the fit by less than {IMITATION:.0%} of a full explanation are not "
                          "named: they may only imitate what is missing.")
     elif found.within_calibration:
-        lines.append(_left_over(found, "may be", found.over_noise) + ", as calibrated sensors may leave.")
-    lines += [f"{name} reads {share:+.1%} against what all other signals say, which is more than a sensor is off by: "
-              "check its scale and its unit. The effects were found with that taken out."
+        lines.append(_left_over(found, "may be", found.over_noise) + ", no more than calibration errors cause.")
+    lines += [f"{name} is {share:+.1%} off against all other signals, more than a calibration error: check its scale "
+              "and its unit. The search for effects corrected it."
               for name, share in found.signals_off.items()]
     lines += _car(found)
     errors, *rises = error_words(found.steps, found.noise_floor_error)
     lines += [f"{errors} {_explained_power(found)}", *rises]
     lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
-                           "{} as the vehicle's file says, {} in the end, noise floor about {}")
+                           "{} with the vehicle's file unchanged, {} finally, noise floor about {}")
     lines += _faint(found)
     dropped = [name for name in _on_the_way(found) if name not in found.verdict]
     if dropped:
-        why = ("the others explain the same" if found.verdict else
-               "its parameter ended at a bound, or where the effect vanishes")
-        lines.append(f"Tried and dropped: {', '.join(dropped)} ({why}, or it explains little beside what is unknown).")
+        why = ("the effects above explain the same" if found.verdict else
+               "its parameter ended at a bound, or at the value where the effect vanishes")
+        lines.append(f"Tried and dropped: {', '.join(dropped)} ({why}, or it explains little of what is left).")
     return lines
 
 
@@ -395,8 +395,9 @@ def _left_over(found: LabDiagnosis, how: str, over: float) -> str:
 
 def _explained_power(found: LabDiagnosis) -> str:
     refitted, last = (percent(one) if one < 0.995 else f"{one:.2%}" for one in found.explained)
-    ends = f", {last} in the end" * (len(found.steps) > 2)
-    linear = "" if found.best_linear is None else f" A linear car could explain {percent(found.best_linear)} at most."
+    ends = f", {last} finally" * (len(found.steps) > 2)
+    linear = "" if found.best_linear is None else (
+        f" No linear model can explain more than {percent(found.best_linear)}.")
     return f"Share of the measured power explained: {refitted} with the parameters refitted{ends}.{linear}"
 
 
@@ -428,13 +429,13 @@ def _car(found: LabDiagnosis) -> list[str]:
     if found.left_open:
         fitted = enumerated([f"{name} {measured(value, error)} {unit_of(name)}".rstrip()
                              for name, (value, error) in found.left_open.items()], "and")
-        lines.append(f"Parameters that were left open, as fitted: {fitted}.")
+        lines.append(f"Fitted parameters that the vehicle's file leaves open: {fitted}.")
     if found.moved:
         lines.append(_moved(found))
     if found.as_moved is not None:
         one = found.as_moved
-        lines.append(f"{one.effect.name} ({one.effect.title}; {numbers_of(one)}) would move all of them in this way. "
-                     f"To tell: {one.effect.shown_by}.")
+        lines.append(f"{one.effect.name} ({one.effect.title}; {numbers_of(one)}) would bias all of them in this way. "
+                     f"To find out: {one.effect.shown_by}.")
     return lines
 
 
@@ -445,9 +446,9 @@ def _moved(found: LabDiagnosis) -> str:
     rest = len(found.moved) - len(shown)
     more = f", and {rest} more" * bool(rest)
     relative = "" if found.shows_forces else (
-        " (Masses, springs and dampers are relative to each other: no run shows a factor common to all.)")
+        " (Masses, springs and dampers are known only relative to each other: no run shows their common scale.)")
     return (f"The refit moved parameters of the vehicle's file: {', '.join(shown)}{more}.{relative} Measure one of "
-            "them and put it into the file; an effect that does the same would then show.")
+            "them and enter it in the file: an effect with the same influence would then show.")
 
 
 def _alike(one: Undetectable) -> str:
@@ -466,11 +467,11 @@ def _missing(found: LabDiagnosis, one: Chosen) -> str:
     likely = f"{P_VALUE} {chance(candidate.p_value)}."
     if name in found.ends:
         there, count = found.ends[name]
-        likely += f" The car's parameters were unknown; {there} of {count} starts ended there."
+        likely += f" The model's parameters were unknown; {there} of {count} starting points led to this result."
     says = "explains part of the residual, or imitates something else" if found.unexplained else "is missing"
     if candidate.confused_with:
         group = enumerated([name, *candidate.confused_with], "or")
-        return (f"One of {group} {says}; these runs cannot distinguish them. If {name} ({one.effect.title})"
+        return (f"Either {group} {says}; these runs cannot distinguish them. If it is {name} ({one.effect.title})"
                 f"{numbers}. {likely}")
     return f"{name} {says} ({one.effect.title}){numbers}. {likely}"
 
@@ -481,8 +482,8 @@ def _faint(found: LabDiagnosis) -> list[str]:
     nearest = min(others, key=lambda one: one.p_value, default=None)
     if found.unexplained or nearest is None or not FALSE_ALARM <= nearest.p_value < _SUSPECT:
         return []
-    return [f"{nearest.effect.name} is nearly named: noise alone looks like it in {percent(nearest.p_value)} of such "
-            f"searches ({percent(FALSE_ALARM)} allowed). To tell: {nearest.effect.shown_by}."]
+    return [f"{nearest.effect.name} just misses the threshold: noise alone looks like it in {percent(nearest.p_value)} "
+            f"of such searches, and ridelog allows {percent(FALSE_ALARM)}. To find out: {nearest.effect.shown_by}."]
 
 
 def _confusion(names: list[str], found: LabDiagnosis) -> str:
@@ -490,8 +491,8 @@ def _confusion(names: list[str], found: LabDiagnosis) -> str:
     drives = [f"{name}: {found.catalogue[name].shown_by}" for name in names]
     alike = {found.catalogue[name].shown_by for name in names}
     would = "; ".join(drives if len(alike) > 1 else alike)
-    return (f"{enumerated(names, 'and')} explain the residual about equally well. Drives that would distinguish them: "
-            f"{would}. ridelog plan tells beforehand whether a drive would.")
+    return (f"{enumerated(names, 'and')} explain the residual about equally well. To distinguish them: {would}. "
+            "ridelog plan predicts whether that would succeed.")
 
 
 def _on_the_way(found: LabDiagnosis) -> list[str]:
@@ -698,16 +699,15 @@ def same_road_summary(found: UnknownRoadDiagnosis) -> list[str]:
             names = enumerated([one.effect.name, *candidate.confused_with], "and")
             lines.append(f"{names} explain the residual about equally well; these drives cannot distinguish them.")
         if candidate.stands_in:
-            lines.append(f"{one.effect.name} is nonlinear. The search replaced it, in each drive and stretch of road, "
-                         "by the linear car nearest to it; its parameters are as accurate as that.")
+            lines.append(f"{one.effect.name} is nonlinear. The search linearised it for each drive and stretch of "
+                         "road; its parameters are only as accurate as that.")
     if found.undecided:
         names, them = enumerated([one.name for one in found.undecided], "or"), len(found.undecided) > 1
         lines.append(f"Undecided: {names}. {'They explain' if them else 'It explains'} more than noise would, but less "
                      "than a tenth of what no road explains, and may only imitate something else that is missing.")
     elif not lines:
-        lines.append("Nothing is missing, of the effects that can be tried without a profile.")
-    by_step = [f"{error:.3f} {'with' if index else 'as'} {words.removeprefix('with ')}"
-               for index, (words, error) in enumerate(_same_road_steps(found))]
+        lines.append("None of the effects that can be tried without a profile is missing.")
+    by_step = [f"{error:.3f} with {words.removeprefix('with ')}" for words, error in _same_road_steps(found)]
     lines.append(f"NRMSE of each drive over the road estimated from the others: {', '.join(by_step)}. Noise floor: "
                  f"{found.floor_error:.3f}.")
     if found.unexplained:
@@ -720,21 +720,22 @@ def same_road_summary(found: UnknownRoadDiagnosis) -> list[str]:
 
 def _same_road_steps(found: UnknownRoadDiagnosis) -> list[tuple[str, float]]:
     """Models on the way, each with its error."""
-    words = ["the vehicle as its file says", "its parameters refitted within their tolerance",
+    words = ["the vehicle's file unchanged", "its parameters refitted within their tolerance",
              *(f"with {one.effect.name}" for one in found.missing)]
     return list(zip(words, found.errors, strict=True))
 
 
 def cannot_tell(found: UnknownRoadDiagnosis) -> list[str]:
     """What these drives cannot show or identify, in sentences."""
-    lines = [f"Whether {one} and {other} follow one road: too little of their records there is above the noise."
-             for one, other in found.doubtful]
+    lines = [f"Whether {one} and {other} are over one road: where they overlap, too little of their records is above "
+             "the noise." for one, other in found.doubtful]
     if found.absorbed_by_road:
-        lines.append(f"{', '.join(found.absorbed_by_road)}: another road, as nobody measured it, would look the same.")
+        lines.append(f"{', '.join(found.absorbed_by_road)}: not tried; on a road that nobody measured, another road "
+                     "would look the same.")
     lines += not_tried(found.untried)
     lines += [f"{name}: detectability {deviations:.1f} ({DETECTABLE_SIGMA:g} needed)."
               for name, deviations in found.hidden.items()]
-    return [*lines, *(f"The car's parameters: {one.words}" for one in found.confounded)]
+    return [*lines, *(f"The model's parameters: {one.words}" for one in found.confounded)]
 
 
 def same_road_lines(found: UnknownRoadDiagnosis, runs: Sequence[str], most: int | None) -> list[str]:

@@ -131,7 +131,7 @@ def learned(bench: Bench, notify: Notify = silent) -> LearnedModel:
                           bench.model.effects, notify)
         if found.law is None:
             return LearnedModel(found, None)
-        notify("fitting the car without and with the law")
+        notify("fitting the model without and with the law")
         added = [bench.filed(one) for one in found.law.effects]
         return LearnedModel(found, add(bench.posterior(), bench.model.effects, [*added, found.law.one],
                                        len(found.law.draft.effect.trials()), found.law.state))

@@ -295,7 +295,7 @@ def _comparison_lines(found: compare.LabComparison) -> list[str]:
 def steps(story: Story) -> list[tuple[str, float]]:
     """Models on the way, each with its error on what no fit saw."""
     start = story.rounds[0].addition if story.rounds else None
-    return [("as its file says", start.error_before if start else story.first.plain.error),
+    return [("file unchanged", start.error_before if start else story.first.plain.error),
             ("parameters refitted", start.error_refitted if start else story.first.steps[-1].error),
             *((f"with {' and '.join(one.addition.names)}", one.addition.error_after) for one in story.rounds)]
 
@@ -311,9 +311,10 @@ def ending(story: Story) -> list[str]:
                      f"{story.last.plain.error:.3f}.")
     lines.append(f"Noise floor: about {story.floor:.3f}.")
     if story.refused:
-        lines.append(f"Missing, but not added as you wished: {', '.join(story.refused)}.")
+        lines.append(f"Missing, but you chose not to add: {', '.join(story.refused)}.")
     if story.not_added:
-        lines.append(f"Missing, but not added: {', '.join(story.not_added)}. Go on with the last file.")
+        lines.append(f"Missing, but not added: {', '.join(story.not_added)}. Run ridelog lab again with the last file "
+                     "to go on.")
     if story.refused or story.not_added:
         return [*lines, *with_what]
     if diagnosis.beyond and not diagnosis.exceeds_noise:
@@ -344,8 +345,8 @@ def as_json(story: Story) -> dict[str, Any]:
     }
 
 
-STEPS_HINT = ("From step 1 on, the car's parameters and the distances are refitted within their tolerance. With the "
-              "files and distances as they are, the NRMSE is larger.")
+STEPS_HINT = ("From step 1 on, the lab refits the model's parameters and the distances within their tolerance. With "
+              "the files and distances as they are, the NRMSE is larger.")
 _HIGHEST_OF_RATE = 0.4
 _QUIET_DB = -80.0
 

@@ -158,7 +158,7 @@ def summary(found: LabPlan) -> list[str]:
     count = len(found.drives)
     chances = found.now.chances
     named = int((chances > 0.5).sum())
-    from_where = ("as in the runs" if found.measured else "as given or usual")
+    from_where = ("as in the runs" if found.measured else "as given, or else usual")
     lines = [f"ridelog diagnose would name {named} of {len(found.names)} effects, each alone and of usual strength, "
              f"from {count} drive{'s' * (count != 1)} of {seconds:.0f} s in all with noise of "
              f"{found.noise.variance**0.5:.3g} {found.unit} r.m.s. ({from_where})."]
@@ -166,7 +166,7 @@ def summary(found: LabPlan) -> list[str]:
         lines.append("Detected, but not distinguished: " + "; ".join(", ".join(one) for one in found.groups) + ".")
     hidden = [name for name, each in zip(found.names, found.now.detectability, strict=True) if each < DETECTABLE_SIGMA]
     if hidden:
-        lines.append(f"Too faint in these drives: {', '.join(hidden)}.")
+        lines.append(f"Too faint to detect: {', '.join(hidden)}.")
     return lines + not_tried(found.obstacles)
 
 
@@ -195,7 +195,7 @@ def number(deviations: float) -> str:
 
 def meaning() -> str:
     """What the numbers are."""
-    return (f"Detectability: by how many standard deviations the effect would stand out after a refit of the car and "
+    return ("Detectability: by how many standard deviations the effect would stand out after a refit of the model and "
             f"the distances; {DETECTABLE_SIGMA:g} needed. Isolability: how many remain when the most similar effect is "
             f"fitted in its place; {ISOLABLE_SIGMA:.1f} needed.")
 

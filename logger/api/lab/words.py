@@ -87,7 +87,7 @@ def removed_words(found: Removed, band: ComparedBand | None) -> list[str]:
                      f"This causes {percent(found.distance_share)} of the residual's power before any fit; the fits "
                      "correct it.")
     if found.drifting_sensors:
-        lines.append(f"The sensor drifts ({drift_words(found)}). The drift has nothing to do with the car and causes "
+        lines.append(f"The sensor drifts ({drift_words(found)}). The motion does not cause the drift, which makes up "
                      f"{percent(found.drift_share)} of the residual's power before any fit. The lab judges nothing "
                      f"below {LOWEST_HZ:g} Hz; without the drift, the refitted model's NRMSE is {found.error:.3f}.")
     return lines
@@ -161,7 +161,7 @@ def _alike(one: Drift, other: Drift) -> bool:
         a is None or b is None or abs(a - b) <= _ALIKE * abs(b) for a, b in pairs)
 
 
-_ERROR_WORDS = {AS_FILED: "as the vehicle's file says", REFITTED: "with its parameters refitted"}
+_ERROR_WORDS = {AS_FILED: "with the vehicle's file unchanged", REFITTED: "with its parameters refitted"}
 
 
 def error_words(steps: Sequence[ErrorStep], floor: float) -> list[str]:

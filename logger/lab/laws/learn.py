@@ -333,7 +333,7 @@ class _LawChoice:
     def _fit_in_full(self, best: LawFit) -> tuple[Baseline, dict[str, float]]:
         """The model with a law fitted to the end, without known effects that it needs no more, and the gains of what is
         left of both."""
-        self.search.progress(f"{best.draft.family.title}: fitting the car with it")
+        self.search.progress(f"{best.draft.family.title}: fitting the model with it")
         found = best.fit.found
         fitted = Baseline.of(fit_to_the_end(align(found.posterior, found.state), found.numbers))
         return self.search.eliminate_backward(self.selection.before, fitted)

@@ -71,4 +71,4 @@ def _loops(draft: Draft, found: Chosen, context: LawContext) -> Curves | None:
                     memory = memory + step_s * np.array(law.rates(law.p, seen))
         last = slice(-_LOOP_STEPS - 1, None, 20)
         lines.append(Line(f"{1000 * way_m:.3g} mm", travel[last], force[last]))
-    return Curves(draft.title, "suspension travel [m], to and fro at body bounce", "force [N]", tuple(lines))
+    return Curves(draft.title, "suspension travel [m], back and forth at body bounce", "force [N]", tuple(lines))

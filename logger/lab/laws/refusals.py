@@ -116,4 +116,4 @@ def _beyond(posterior: Posterior, one: Chosen) -> str:
     if frequency_hz is not None and not low_hz < frequency_hz < high_hz:
         return (f"its frequency, {frequency_hz:.3g} Hz, is outside of {low_hz:.2g} to {high_hz:.3g} Hz, in which the "
                 "runs are compared")
-    return "one of its numbers is at an end of what it may be" if is_outside_data(posterior, one) else ""
+    return "one of its parameters ended at a bound" if is_outside_data(posterior, one) else ""

@@ -121,7 +121,7 @@ def plan(there: PlannedCar, runs: Posterior | None, planned: Sequence[Run], effe
     """
     fitted, measured = None, noise is None and runs is not None
     if runs is not None:
-        progress("refitting the car's own numbers")
+        progress("refitting the model's parameters")
         fitted = fit_model(runs, runs.start(there.effects))
         there = replace(there, logs=fitted.state.logs)
         main = runs.runs.runs[0].facts.main

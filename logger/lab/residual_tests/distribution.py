@@ -126,7 +126,7 @@ class ToneTest(ResidualTest):
     def sentence(self, found: ResidualTestResult) -> str:
         """Where it is."""
         return (f"A single frequency stands out in the residual: {found.value:.1f} Hz, in {found.figures['run']}. "
-                "Something hums or rings there.")
+                "Likely causes: a machine's hum, a resonance, or a harmonic of the excitation.")
 
 
 TESTS = ResidualTests("distribution", (WhitenessTest(), FrequencyTest(), SkewnessTest(), ToneTest()))

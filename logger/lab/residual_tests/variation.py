@@ -73,7 +73,7 @@ class SpeedTest(ResidualTest):
     def sentence(self, found: ResidualTestResult) -> str:
         """The factor between both speeds."""
         slow_mps, fast_mps = found.figures["slow_mps"], found.figures["fast_mps"]
-        return (f"On stretches with the same motion of the car, the residual is {found.value:.1f} times as large at "
+        return (f"Where the motion is the same, the residual is {found.value:.1f} times as large at "
                 f"{fast_mps:.0f} m/s as at {slow_mps:.0f} m/s.")
 
 

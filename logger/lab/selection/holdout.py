@@ -26,7 +26,7 @@ from logger.runs import Run
 
 JUDGED_ON = "held-out stretches"
 """What the errors of steps and candidates are errors of."""
-AS_FILED, REFITTED = "the vehicle as its file says", "its parameters refitted"
+AS_FILED, REFITTED = "the vehicle's file unchanged", "its parameters refitted"
 # A relative difference below it is a rounding: errors are printed to two digits or three.
 ROUNDING = 0.005
 _STRETCH_S, _FOLDS = 6.0, 3

@@ -301,7 +301,7 @@ class Search(Generic[M, P, F]):
                     break
                 now = other
                 continue
-            self.progress(f"{best.effect.name} is missing; fitting the car with it")
+            self.progress(f"{best.effect.name} is missing; fitting the model with it")
             self._rivals[best.effect.name] = self._rivals_of(now, best.gain, best.effect.name, tried)
             now = self._reconsider(self.likelihood.with_effect(best), best.effect.name, now)
             *earlier, added = names_of(now)[self.present:]

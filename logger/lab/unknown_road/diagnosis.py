@@ -295,7 +295,7 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
         one, other = (problem.runs[run].name for run in found)
         raise NotOneRoad(f"{one} and {other}: expected drives over the same road, found that neither predicts what the "
                          f"other met. {NOT_ONE_ROAD}; name drives over one road only")
-    progress("refitting the car's own numbers and the road")
+    progress("refitting the model's parameters and the road")
     before = fit(problem.preconditioned(nominal), nominal)
     as_filed = before.problem.error(replace(nominal, roads=before.state.roads))
     base = RoadModel(replace(before, problem=before.problem.moved_as(before.state)))
@@ -368,23 +368,23 @@ def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequen
     for name, effect in effects.items():
         why = effect.obstacle(problem.vehicle, True)
         if why is None and effect.obstacle(problem.vehicle, False) is not None:
-            why = "the road has to be known under the right wheels too"
+            why = "the profile under the right wheels is needed too"
         if name in [one.effect.name for one in present]:
             why = "the model has it"
         elif why is None and isinstance(effect, RoadEffect):
-            why = "it is about a profile, and there is none"
+            why = "it acts on a profile, and there is none"
         elif why is None and isinstance(effect, DriveEffect):
-            why = "it changes the way of every drive alike, and so would another road"
+            why = "a common scale of all distances looks like another road"
         elif why is None and not (effect.reshapes or problem.exact_places):
-            why = "it only shifts the record, and the distances of these drives, by a receiver, shift as well"
+            why = "a shift of the record looks like an error of the GPS distances"
         elif why is None:
             try:
                 there = problem.response((*present, chosen(effect, effect.usual)), problem.start_vehicle)
                 off = np.abs(there - nominal).max() / np.abs(nominal).max()
                 if isinstance(effect, ForceEffect) and off <= no_change:
-                    why = "it only adds what is not in proportion to the road, which takes a measured road"
+                    why = "only a measured road shows motion that is not proportional to the road"
             except ValueError:
-                why = "no linear car stands in for one that has it, which takes a measured road"
+                why = "what cannot be linearised takes a measured road"
         if why is not None:
             found[name] = why
     return found
@@ -394,7 +394,7 @@ def _placed_anew(now: SameRoadFit, progress: Progress) -> SameRoadFit:
     """The fit with its drives laid on each other by what its car feels: by a car without its effects they lie wrong,
     and the next effect would imitate that. Laid anew they may no longer have enough of a road in common: then they stay
     where they are."""
-    progress("laying the drives on one distance anew")
+    progress("aligning the drives again")
     old, state = now.problem, now.state
     car = old.prior.vehicle(old.vehicle, state.logs)
     try:

@@ -160,7 +160,7 @@ def read_on_board(path: Path | str) -> CarModel:
                            "(ridelog identify finds it from runs)")
     for item in keys["effects"].items() if "effects" in keys else ():
         if "file" in (said := item.mapping()):
-            raise said["file"].wrong("an effect that comes with ridelog: the service runs no Python of others")
+            raise said["file"].wrong("an effect that comes with ridelog, as the service runs no effect files of users")
     return read_model(path)
 
 

@@ -51,9 +51,9 @@ class DamperHeat(Family):
     def _draft(self, variant: str, losses: Mapping[str, str], trials: tuple[float, ...], lost: str) -> Draft:
         parameters = (
             *(Parameter(name, 1e-4, 0.0, 0.05, 0.0, Scale.LINEAR, trials,
-                        f"what the logarithm of {of} loses by what it takes up") for name, of in losses.items()),
+                        f"loss of the logarithm of {of} per energy that it takes up") for name, of in losses.items()),
             Parameter("cooling_time_s", 30.0, 3.0, 600.0, None, Scale.LOG, (15.0, 100.0),
-                      "in which what was lost comes back to 37 %"))
+                      "in which the loss falls to 37 %"))
         return self.draft(parameters, _METHOD.format(lost=lost), _FUNCTIONS, variant=variant)
 
     def narrower(self, draft: Draft, context: LawContext) -> list[Draft]:

@@ -75,7 +75,7 @@ def _draft(context: LawContext, axle: str, runs: Sequence[str], radius_m: float,
                         for number, name in enumerate(names)) if last else f"p.{names[0]}"
     parameters = (
         Parameter("force_n", usual_n, -100 * usual_n, 100 * usual_n, 0.0, Scale.LINEAR, (usual_n,),
-                  "that the tire pushes less by, in the middle of it", step=0.1 * usual_n),
+                  "by which the tire's force falls at its middle", step=0.1 * usual_n),
         Parameter("length_m", _LENGTH_M, 0.03, 0.8, None, Scale.LOG, (_LENGTH_M,), "of it, along the tread"),
         Parameter("turn_radius_m", radius_m, *_RADII_M, None, Scale.LOG, (radius_m,),
                   "of a wheel that turns once for each", step=1e-5),

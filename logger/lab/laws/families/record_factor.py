@@ -52,8 +52,8 @@ class RecordFactor(Family):
             return f"a record to which {say('added_ratio')} of it is added below {say('frequency_hz')}"
         if draft.variant == "rising":
             return f"a record to which {say('added_ratio')} of it is added above {say('frequency_hz')}"
-        return (f"a record that something rings into at {say('frequency_hz')} with a damping of "
-                f"{say('damping_ratio')}, by {say('added_ratio')} at rest and {say('rate_ratio')} by the rate")
+        return (f"a record with a resonance at {say('frequency_hz')} of damping ratio {say('damping_ratio')}, which "
+                f"adds {say('added_ratio')} at rest and {say('rate_ratio')} by the rate")
 
 
 FAMILY = RecordFactor()

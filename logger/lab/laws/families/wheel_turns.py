@@ -58,7 +58,7 @@ class WheelTurns(Family):
                       f"mass times distance from the {axle or 'wheel'} axle, {words}{of_run(run)}",
                       step=0.1 * _USUAL_KG_M)
             for axle in axles for run in runs
-            for part, words in (("cos", "down where the way is 0"), ("sin", "a quarter turn later"))]
+            for part, words in (("cos", "downward at distance 0"), ("sin", "a quarter turn later"))]
         radius = Parameter("turn_radius_m", radius_m, *_RADII_M, None, Scale.LOG, (radius_m,),
                            "of a wheel that turns once for each of its pulls", step=1e-5)
         functions = _FUNCTIONS.format(cos=_of_run("cos", runs), sin=_of_run("sin", runs))
