@@ -426,20 +426,20 @@ def lines(found: Assessment, summary: dict[str, Any]) -> list[str]:
     if not summary["answered_count"]:
         return [f"No IRI: {_unanswered(summary) or 'the drive is shorter than one window'}", *doubts, *details]
     limit = summary["limit"]
-    details += [
+    limits = [
         "The limit, an estimator that knows road, car and noise exactly: standard error "
         f"{limit['std_m_per_km']:.2f} m/km at {summary['speed_mps']:.0f} m/s; R2 {limit['r2_iri_1_to_10']:.3f} over "
         f"roads of IRI {MIX_IRI[0]} to {MIX_IRI[-1]}, {limit['r2_this_road']:.3f} on a road like this one.",
         "Wavelengths resolved: " + _range_words(found),
     ]
     if (factor := summary["iri_std_m_per_km"] / limit["std_m_per_km"]) > _FAR_ABOVE:
-        details.append(f"The standard errors are {factor:.1f} times that limit: they include a few percent of error in "
+        limits.append(f"The standard errors are {factor:.1f} times that limit: they include a few percent of error in "
                        "the vehicle file, and readings that vehicle and noise do not explain.")
     answer = (f"IRI {summary['iri_m_per_km']:.2f} m/km on average, {summary['iri_min_m_per_km']:.2f} to "
               f"{summary['iri_max_m_per_km']:.2f}; standard error of one window {summary['iri_std_m_per_km']:.2f}; "
               f"{summary['answered_count']} of {summary['window_count']} windows"
               + (f" ({_unanswered(summary)})" if summary["unanswered"] else "") + ".")
-    return [answer, *doubts, "", *_table(summary), "", *details]
+    return [answer, *doubts, "", *_table(summary), "", *limits, "", *details]
 
 
 def _sensor_lines(summary: dict[str, Any]) -> list[str]:
