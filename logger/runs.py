@@ -357,7 +357,7 @@ def runs_left_out(runs: Sequence[Run]) -> tuple[LeftOut, ...]:
     return counting((
         LeftOut(sum(run.cut_s for run in runs), "s", "in which nothing drove it or nothing was read"),
         LeftOut(sum(run.first / run.rate_hz for run in runs), "s",
-                "at the beginning of runs, because the motion before them is unknown"),
+                "at the beginning of runs, as the motion before is unknown"),
         LeftOut(sum(np.count_nonzero(~run.read[run.first:]) / run.rate_hz for run in runs), "s",
                 "in short holes between readings")))
 

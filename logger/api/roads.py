@@ -272,16 +272,13 @@ def iri_lines(result: ProfileIri, profile: Profile, name: str) -> list[str]:
     whole = result.row(0)
     first = "mri_m_per_km" if "mri_m_per_km" in whole else "iri_m_per_km"
     roughness = whole[first]
-    printed = [_of_profile(profile, name)]
-    if doubt := unit_doubt(_roughest(result)):
-        printed.append(doubt)
-    if profile.widest_step_m is not None:
-        printed.append(f"Resampled: straight lines between samples up to {profile.widest_step_m:.3g} m apart.")
-    printed += [
-        "", ", ".join(f"{_HEADS[key]} {value:.3f} m/km ({value / INCH_PER_MILE_M_PER_KM:.1f} in/mi)"
+    printed = [
+        ", ".join(f"{_HEADS[key]} {value:.3f} m/km ({value / INCH_PER_MILE_M_PER_KM:.1f} in/mi)"
                       for key, value in whole.items()),
         f"Roads like this: {', '.join(road_kinds(roughness)) or 'none of the usual'}",
-        f"Ride: {ride_words(roughness)}", "", *_cut_short(result),
+        f"Ride: {ride_words(roughness)}",
+        *([doubt] if (doubt := unit_doubt(_roughest(result))) else []),
+        "", *_cut_short(result),
         f"{'from m':>10} {'to m':>10}" + "".join(f" {_HEADS[key]:>10}" for key in whole) + f" m/km {'in/mi':>9}",
     ]
     for number, window in enumerate(result.windows, start=1):
@@ -290,6 +287,9 @@ def iri_lines(result: ProfileIri, profile: Profile, name: str) -> list[str]:
         values = "".join(f" {value:10.3f}" for value in row.values())
         printed.append(f"{start_m:10.2f} {end_m:10.2f}{values} {row[first] / INCH_PER_MILE_M_PER_KM:14.1f}"
                        + ("   partial" if window.partial else ""))
+    printed += ["", _of_profile(profile, name)]
+    if profile.widest_step_m is not None:
+        printed.append(f"Resampled: straight lines between samples up to {profile.widest_step_m:.3g} m apart.")
     return printed
 
 
@@ -313,12 +313,11 @@ def _track_json(track: TrackClass) -> dict[str, Any]:
 
 def class_lines(tracks: Sequence[TrackClass], profile: Profile, name: str) -> list[str]:
     """The lines a person sees; ``name`` is that of the file."""
-    printed = [_of_profile(profile, name)]
-    if doubt := unit_doubt(max(track.iri_m_per_km for track in tracks)):
-        printed.append(doubt)
+    doubt = unit_doubt(max(track.iri_m_per_km for track in tracks))
+    printed = [doubt, ""] if doubt else []
     for side, track in zip(("left track", "right track") if len(tracks) > 1 else ("",), tracks, strict=True):
-        printed += [*(["", side] if side else []), "", *_track_lines(track)]
-    return printed
+        printed += [*([side] if side else []), *_track_lines(track), ""]
+    return [*printed, _of_profile(profile, name)]
 
 
 def _track_lines(track: TrackClass) -> list[str]:

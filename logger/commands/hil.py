@@ -29,6 +29,7 @@ from drivers.accelerometers.accelerometer import SerialAccelerometer
 from drivers.dump import DumpReader, open_dump
 from drivers.hardware import open_serial
 from drivers.readings import GPS
+from logger.commands.options import on_screen, wipe
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
 from logger.estimation.receiver_delay import CarriedDelay
 from logger.records import WindowRecord
@@ -165,7 +166,7 @@ def _play(args: argparse.Namespace, config: Config) -> Sent:
         try:
             return send(recording.events, ports, _now_us, time.sleep, _show)
         finally:
-            print(file=sys.stderr)
+            wipe()
 
 
 def _wired(args: argparse.Namespace, reader: DumpReader) -> Wired:
@@ -173,7 +174,7 @@ def _wired(args: argparse.Namespace, reader: DumpReader) -> Wired:
 
 
 def _show(played_s: float) -> None:
-    print(f"\rplaying: {played_s:.0f} s", end="", file=sys.stderr, flush=True)
+    on_screen()(f"playing: {played_s:.0f} s")
 
 
 def _now_us() -> int:

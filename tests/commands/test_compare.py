@@ -50,8 +50,8 @@ def test_for_a_person(runs: list[str], capsys: pytest.CaptureFixture[str]) -> No
     assert compare(*runs) == 0
     reported = capsys.readouterr().out
     lines = reported.splitlines()
-    assert lines[0] == "rav4-2009 on 2 runs, 24 s"
-    assert lines[2].startswith("The model lacks something: ")
+    assert "rav4-2009 on 2 runs, 24 s." in lines
+    assert lines[0].startswith("The model lacks something: ")
     assert re.search(r"NRMSE 0\.\d{3} \(residual [\d.]+ over measured [\d.]+ m/s2 r\.m\.s\.\)\.", " ".join(lines))
     assert "Next: ridelog diagnose" in " ".join(reported.split())
     assert all(len(line) <= 100 for line in lines)

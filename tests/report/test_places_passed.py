@@ -47,7 +47,7 @@ def test_rows_without_an_iri_and_empty_drives_are_borne() -> None:
 def test_a_page_of_too_many_windows_says_that_drives_lie_over_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
     rows = repeated_drives(2, 20, (2.0, 3.0))
     drives = [date_words(summarise(rows[part])) for part in (slice(20), slice(20, None))]
-    assert "colour is that of their mean" in str(track_views(rows, summarise(rows), "", drives))
+    assert "colour shows their mean" in str(track_views(rows, summarise(rows), "", drives))
     monkeypatch.setattr("logger.report.page.MOST_ROWS", 30)
     page = str(track_views(rows, summarise(rows), "", drives))
     assert "More than 30 windows" in page and "ridelog passes" in page and "colour is that of" not in page

@@ -326,10 +326,11 @@ def comparison_lines(found: LabComparison) -> list[str]:
     residuals = found.plain.residuals
     seconds = sum(map(len, residuals.residual)) / residuals.rate_hz
     return [
-        f"{found.vehicle} on {len(residuals.runs)} run{'s' * (len(residuals.runs) != 1)}, {seconds:.0f} s", "",
         wrapped([conclusion(found), *headline(found)]), "", "After the refit:", wrapped(evidence(found), "- "), "",
         wrapped([next_step(found)]), "",
-        *_comparison_tables(found), *left_out_paragraph(runs_left_out(residuals.runs)),
+        *_comparison_tables(found), "",
+        f"{found.vehicle} on {len(residuals.runs)} run{'s' * (len(residuals.runs) != 1)}, {seconds:.0f} s.",
+        *left_out_paragraph(runs_left_out(residuals.runs)),
     ]
 
 

@@ -146,7 +146,7 @@ def diagnosis_of(found: LabDiagnosis, bench: Bench, most: int | None = None, nex
                  ) -> Diagnosis:
     """What the lab found on a bench, as it is shown; ``most`` so many candidates, None: all."""
     left_out = runs_left_out(bench.runs.runs)
-    text = [wrapped([_compared(bench)]), "", *diagnosis_lines(found, most), *left_out_paragraph(left_out)]
+    text = [*diagnosis_lines(found, most), "", wrapped([_compared(bench)]), *left_out_paragraph(left_out)]
     errors = {one.effect.name: one.standard_errors for one in found.missing}
     candidates = tuple(Candidate(one.effect.name, dict(one.values), dict(errors.get(one.effect.name, {})), one.error,
                                  one.p_value, tuple(one.confused_with)) for one in found.candidates)
@@ -159,7 +159,7 @@ def _compared(bench: Bench) -> str:
     runs, model = bench.runs.runs, bench.model
     seconds = sum((run.count - run.first) / run.rate_hz for run in runs)
     has = f", with {', '.join(one.effect.name for one in model.effects)}," if model.effects else ""
-    return (f"{model.vehicle.name}{has} on {len(runs)} run{'s' * (len(runs) != 1)}, {seconds:.0f} s. "
+    return (f"{model.vehicle.name}{has} on {len(runs)} run{'s' * (len(runs) != 1)}, {seconds:.0f} s; "
             f"ridelog knows {len(bench.effects)} effects.")
 
 
