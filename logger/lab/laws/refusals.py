@@ -73,8 +73,8 @@ def refusal(draft: Draft, model: Baseline) -> Refusal | None:
     if why := _beyond(model.posterior, one):
         return Refusal(draft.title, why)
     if draft.family.is_straight(draft, one, SURE_SIGMA):
-        return Refusal(draft.title, f"it is a straight line within {SURE_SIGMA:g} standard errors, as a number of the "
-                                    "car already is")
+        return Refusal(draft.title, f"it is a straight line within {SURE_SIGMA:g} standard errors, which a parameter "
+                                    "of the model already describes")
     return None
 
 
