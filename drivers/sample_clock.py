@@ -623,9 +623,9 @@ class DatedSamples:
         """What is wrong with the samples that come, and what to ``check``; empty: nothing."""
         if self.clock.refused_hz is not None:
             return (f"it gives about {self.clock.refused_hz:.0f} samples a second, unsteadily or too few, where "
-                    f"{self._rate_hz:g} are expected: no rows are made of them. {check}")
+                    f"{self._rate_hz:g} are expected: ridelog makes no rows of them. {check}")
         if self.clock.too_many_lost:
-            return f"more samples are lost than can be located: no rows are made of those that come. {check}"
+            return f"too many samples are lost to locate each: ridelog makes no rows of the others. {check}"
         if self.clock.lost_share >= WORTH_TELLING:
             return f"{100 * self.clock.lost_share:.1f} of 100 samples are lost, and their rows flagged gap. {check}"
         return self.burst_doubt

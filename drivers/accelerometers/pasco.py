@@ -178,7 +178,7 @@ class PascoDecoder:
                     f"profile {self._profile.name} says {usual}: no rows are made of them. Set the device to {usual} a "
                     "second, or find what loses them (lost lines: baud rate at both ends, cable, a busy bridge)")
         if self._clock.too_many_lost:
-            return ("more samples are lost on the line than can be located: no rows are made of those that come. Check "
+            return ("too many samples are lost on the line to locate each: ridelog makes no rows of the others. Check "
                     "the baud rate at both ends, the cable, and whether the bridge keeps up")
         if self._clock.lost_share >= WORTH_TELLING:
             return (f"{100 * self._clock.lost_share:.1f} of 100 samples are lost on the line, and their rows flagged "

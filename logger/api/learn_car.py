@@ -588,7 +588,7 @@ def _charts(problem: UnknownCar, car: LearnedCar) -> Iterator[Chart]:
     edges = np.quantile(speeds, (0.0, 1 / 3, 2 / 3, 1.0))
     start = problem.knowledge.mean
     before, _ = problem.with_blocks(start, problem.start(start))
-    cars = {"any car": (start, before), "this car": (car.x, car.roads)}
+    cars = {"average car": (start, before), "this car": (car.x, car.roads)}
     for low, high in pairwise(edges):
         group = (speeds >= low) & (speeds <= high)
         seen = (problem.weight[group] > 0).all(axis=0)

@@ -560,8 +560,8 @@ LowPass = Annotated[float | None, Option(
     "leave out frequencies above it, for example 20, in the record and in the model; errors are of the rest (default: "
     "all that the record holds; a record that somebody has low-passed is recognised, and said)", metavar="HZ")]
 EffectFiles = Annotated[Sequence[Path | str], Option(
-    "a Python file with an effect of your own, to be tried as well; may repeat. The names hysteresis and "
-    "frame_friction are taken too: ridelog has these effects, and tries them only where they are asked for",
+    "a Python file with an effect of your own, to be tried as well; may repeat. Or hysteresis or frame_friction, "
+    "effects of ridelog that it tries only on request",
     metavar="FILE.py", read=Path, many=list, flag="--effect-file")]
 
 

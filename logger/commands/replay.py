@@ -12,13 +12,12 @@ import argparse
 import json
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from drivers.dump import open_dump
-from logger.api.question import silent
-from logger.commands.options import on_screen, wipe
 from logger.errors import BadInput
 from logger.files import make_folder, note
 from logger.printable import counted
@@ -132,14 +131,12 @@ def replay(dump: Path, out: Path, given: Config | None, rate: float, vehicle: st
             pipeline = wiring.pipeline(config, sensor, car, known)
             segment_log = SegmentLog(out, session, facts, config.log.max_file_bytes, more=pipeline.sidecar)
             core = EventCore(sensor.decoder, wiring.gps_decoder(config), pipeline, segment_log)
-            show = silent if quiet else on_screen()
-            player = Player(core, rate, lambda played_s: show(f"playing: {played_s / 60:.0f} min"))
+            player = Player(core, rate, _progress(quiet or not sys.stderr.isatty()))
             started_s = time.monotonic()
             played = player.play(reader)
             wall_s = time.monotonic() - started_s
     if not quiet:
-        wipe()
-        print(f"played {played.duration_s:.0f} s of driving in {wall_s:.1f} s", file=sys.stderr)
+        print(f"\rplayed {played.duration_s:.0f} s of driving in {wall_s:.1f} s      ", file=sys.stderr)
     files, summary = _written(out, session)
     for file in files:
         note(file)
@@ -157,3 +154,11 @@ def _written(out: Path, session: int) -> tuple[list[Path], Any]:
     files = sorted(out.glob(f"{session:05d}-*.csv"))
     records = [record for path in files for record in read_log(path).records]
     return files, summarise(records)
+
+
+def _progress(quiet: bool) -> Callable[[float], None]:
+    def tell(played_s: float) -> None:
+        if not quiet:
+            print(f"\rplaying: {played_s / 60:.0f} min", end="", file=sys.stderr, flush=True)
+
+    return tell

@@ -142,7 +142,7 @@ def even_samples(time_s: Array, samples: Array, rate_hz: float, range_end: float
     dropped = 1.0 - sum(len(one[0]) for one in whole) / sum(len(part) for part in pieces)
     longest = max(taken, key=lambda one: len(one[0]))[0] if taken else np.concatenate([one[0] for one in whole])
     if len(longest) < 2:
-        raise ValueError("expected samples that were taken, each at a time of its own, found one")
+        raise ValueError("expected two samples or more at different times, found one")
     own_hz = mean_rate_hz(longest)
     if own_hz > FASTEST_HZ:
         raise ValueError(f"expected at most {FASTEST_HZ:g} samples a second, found {own_hz:.3g}: is the unit of the "

@@ -71,7 +71,7 @@ FLAG_MEANINGS: Mapping[str, str] = {
     "time_unset": "the GPS had not given the time yet",
     "partial": "cut short by the end of a drive or of the recording",
     "unsettled": "too near to a start, an end or a hole in the readings",
-    "hidden": "the ride is below the sensor's own noise: no value, but it counts in means as what it can be",
+    "hidden": "the ride is below the sensor's noise: no value; means count half of the power that was read",
     "faint": "the sensor hardly sees this road at this speed",
     "blind": "no speed: a window by time, without distance",
 }

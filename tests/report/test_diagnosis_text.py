@@ -115,7 +115,7 @@ def test_what_no_candidate_explains_is_said_and_so_are_imitations_that_are_not_n
                     "sensor's noise. Beyond that noise it is less than 0.1% of the measured power.")
     imitating = replace(found, candidates=(candidate("tire_damping", 1e-5, 40.0), *OTHERS[1:]))
     _, imitation, _ = diagnosis_summary(imitating)
-    assert imitation.startswith("Effects that improve the fit by less than 10% of a full explanation are not named")
+    assert imitation.startswith("ridelog names no effect that gains less than 10% of what a full explanation would")
 
 
 def test_numbers_outside_their_tolerance_are_named_with_how_far_they_are_off() -> None:

@@ -136,7 +136,7 @@ class AddedEffect(CommandResult):
     def figures(self) -> list[doc.Html]:
         """How the error fell."""
         return [falling("NRMSE, model by model", [
-            ("as filed", self.error_before), ("parameters refitted", self.error_refitted),
+            ("file unchanged", self.error_before), ("parameters refitted", self.error_refitted),
             (f"with {self.effect}", self.error_after)], self.noise_floor_error)]
 
 
@@ -385,7 +385,7 @@ def page(found: LabComparison) -> doc.Html:
 
 def _tiles(found: LabComparison) -> doc.Html:
     residuals = found.plain.residuals
-    return doc.tiles([("NRMSE as filed", f"{found.plain.error:.3f}", ""),
+    return doc.tiles([("NRMSE, file unchanged", f"{found.plain.error:.3f}", ""),
                       ("NRMSE refitted", f"{found.steps[-1].error:.3f}", JUDGED_ON),
                       *drift_tile(found.removed),
                       ("Residual tests that find something", f"{len(found.tests_found)}",
@@ -511,7 +511,7 @@ def _table(title: str, unit: str, plain: Sequence[Part], refitted: Sequence[Part
 
     heads = ((doc.Html("<th>Band</th>") if named else doc.EMPTY) + doc.html("<th class=n>From, to [{}]</th>", unit)
              + doc.Html("<th>Share of the residual</th><th></th><th class=n>NRMSE refitted</th>")
-             + (doc.Html("<th class=n>NRMSE as filed</th>") if stands else doc.EMPTY))
+             + (doc.Html("<th class=n>NRMSE, file unchanged</th>") if stands else doc.EMPTY))
     rows = doc.concatenated(doc.html("<tr>{}</tr>", cells(one, part)) for one, part in pairs)
     return doc.section(title, doc.html('<div class="scroll"><table><tr>{}</tr>{}</table></div>', heads, rows))
 

@@ -365,8 +365,8 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
             lines.append(f"It appears only in {enumerated(found.contradicted_by, 'and')}; the model explains the other "
                          "signals down to their noise. Check that sensor: its place, its sign, its filter.")
         if any(one.p_value < FALSE_ALARM and one.effect.name not in found.verdict for one in found.candidates):
-            lines.append(f"Effects that improve the fit by less than {IMITATION:.0%} of a full explanation are not "
-                         "named: they may only imitate what is missing.")
+            lines.append(f"ridelog names no effect that gains less than {IMITATION:.0%} of what a full explanation "
+                         "would: it may only imitate what is missing.")
     elif found.within_calibration:
         lines.append(_left_over(found, "may be", found.over_noise) + ", no more than calibration errors cause.")
     lines += [f"{name} is {share:+.1%} off against all other signals, more than a calibration error: check its scale "
@@ -629,7 +629,7 @@ def _tiles(found: LabDiagnosis) -> doc.Html:
     unknown = "something unknown" if not missing else f"{count}, and more"
     return doc.tiles([
         ("Missing", unknown if found.unexplained else count, ""),
-        ("NRMSE as filed", f"{found.baseline_error:.3f}", "as recorded"),
+        ("NRMSE, file unchanged", f"{found.baseline_error:.3f}", ""),
         ("NRMSE with the missing effects" if missing else "NRMSE refitted", f"{found.final_error:.3f}", "refitted"),
         *drift_tile(found.removed),
         ("Noise floor", f"{found.noise_floor_error:.3f}", "NRMSE"),
@@ -646,7 +646,7 @@ def _diagnosis_steps(found: LabDiagnosis) -> doc.Html:
 def _candidates(found: LabDiagnosis) -> doc.Html:
     bars = Bars("NRMSE with each effect", "NRMSE", tuple(
         (one.effect.name, one.error) for one in found.candidates[:_MOST_BARS]),
-        (found.baseline_error, "as filed"))
+        (found.baseline_error, "file unchanged"))
     return (chart(bars) + doc.grid(_HEADS, table(found), words=(0, 3))
             + doc.hint("One effect at a time on the refitted model: first those that are missing, then by p-value, the "
                        f"probability that noise alone looks like any of them. NRMSE on {JUDGED_ON}."))
@@ -673,7 +673,7 @@ def _force(one: ForceCurve) -> doc.Html:
     return chart(Curves(
         f"{one.axle.capitalize()} suspension: force by {one.motion}",
         f"{one.motion} [{_MOTION_UNITS[one.motion]}], positive in extension", "force [N]",
-        (Line("refitted", one.at, one.after_n), Line("as filed", one.at, one.before_n))))
+        (Line("refitted", one.at, one.after_n), Line("file unchanged", one.at, one.before_n))))
 
 
 def _where(shape: Shape) -> doc.Html:

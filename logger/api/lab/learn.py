@@ -315,7 +315,7 @@ def _nearest_json(one: Nearest | None) -> dict[str, Any] | None:
 
 def steps_of(law: Law, addition: AddedEffects) -> list[tuple[str, float]]:
     """How the error fell."""
-    return [("as filed", addition.error_before), ("parameters refitted", addition.error_refitted),
+    return [("file unchanged", addition.error_before), ("parameters refitted", addition.error_refitted),
             (f"with {' and '.join([*(one.effect.name for one in law.effects), law.draft.title])}",
              addition.error_after)]
 
@@ -359,6 +359,6 @@ def _tiles(summary: dict[str, object]) -> Html:
         value = summary[key]
         return f"{value:.3f}" if isinstance(value, float) else "not known"
 
-    return tiles([("NRMSE as filed", error("error_before"), "as recorded"),
+    return tiles([("NRMSE, file unchanged", error("error_before"), ""),
                   ("NRMSE in the end", error("error_after_unseen"), JUDGED_ON),
                   ("Noise floor", error("noise_floor_error"), "NRMSE")])

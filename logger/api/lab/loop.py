@@ -380,7 +380,7 @@ def story_page(story: Story) -> doc.Html:
 
 def _story_tiles(story: Story) -> doc.Html:
     return doc.tiles([
-        ("NRMSE as filed", f"{steps(story)[0][1]:.3f}", "as recorded"),
+        ("NRMSE, file unchanged", f"{steps(story)[0][1]:.3f}", ""),
         ("NRMSE finally", f"{steps(story)[-1][1]:.3f}", "refitted"),
         ("Noise floor", f"{story.floor:.3f}", "NRMSE"),
         ("Effects added", f"{len(story.added)}", ""),
@@ -506,7 +506,7 @@ def _field_tiles(story: Story, before: Assessment, after: Assessment) -> doc.Htm
     return doc.tiles([
         ("Bias of the IRI, initially", f"{first['bias']:+.1%}", f"R2 {first['r2']:.2f}"),
         ("finally", f"{last['bias']:+.1%}", f"R2 {last['r2']:.2f}"),
-        ("NRMSE, initially", f"{steps(story)[0][1]:.3f}", "as filed"),
+        ("NRMSE, initially", f"{steps(story)[0][1]:.3f}", "file unchanged"),
         ("finally", f"{steps(story)[-1][1]:.3f}", "refitted"),
     ])
 
