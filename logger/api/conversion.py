@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import astuple, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from logger.api.log_questions import ConvertQuestion
 from logger.api.question import function
 from logger.api.shown import CommandResult, check_out
 from logger.errors import BadInput
-from logger.exchange.layer import Attribute, Feature, Kind, Layer, cut
+from logger.exchange.layer import Attribute, Feature, Kind, Layer, cut, format_of, windows_layer, write_layer
 from logger.left_out import counting, left_out_json, left_out_lines
 from logger.printable import counted
 from logger.records import WindowRecord
@@ -26,11 +25,8 @@ from logger.roads.iso8608 import iri_class
 from logger.roads.repeated_drives import LEAST_COVERED, passes_of, scatter_of, suggestion, way_means
 from logger.roads.road_matching import Array, RoadNetwork, match, on_sphere
 from logger.roads.sections import WindowErrors
-from logger.store.formats.road_lines import MapWay
-from logger.store.log.log_reader import split_drives
-
-if TYPE_CHECKING:
-    from logger.store.log.log_reader import LoggedFile
+from logger.store.formats.road_lines import MapWay, read_map_ways
+from logger.store.log.log_reader import LoggedFile, find_logs_in, read_found, split_drives
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -53,9 +49,6 @@ class Conversion(CommandResult):
 
 def converted(question: ConvertQuestion) -> Conversion:
     """The answer to ``ConvertQuestion``, which says what is raised."""
-    from logger.exchange.layer import format_of, windows_layer, write_layer
-    from logger.store.log.log_reader import find_logs_in, read_found
-
     path, smoothness = Path(question.to), question.smoothness
     form, found = format_of(path), find_logs_in(question.places)
     check_out(path, (), [*([] if smoothness is None else [Path(smoothness)]), *(log for log, _ in found)], "--to")
@@ -77,8 +70,6 @@ convert = function("convert", ConvertQuestion, converted)
 
 
 def _ways(files: Sequence[LoggedFile], roads: Path | str) -> Layer:
-    from logger.store.formats.road_lines import read_map_ways
-
     layer = smoothness_layer([one for file in files for one in file.records], read_map_ways(roads))
     if not layer.features:
         raise BadInput(f"{roads}: expected ways that these logs passed with an IRI, found none")

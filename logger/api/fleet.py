@@ -13,13 +13,13 @@ from logger.api.log_questions import IngestQuestion, ReportQuestion, SummariseQu
 from logger.api.question import function
 from logger.api.shown import CommandResult
 from logger.errors import BadInput
-from logger.fleet.dataset import EXTRA, Dataset, existing
+from logger.files import note, read_bounded, replace_bytes
+from logger.fleet.dataset import EXTRA, Dataset, Engine, existing, opened
+from logger.fleet.road_map import RoadMap, RoadPieces, cell_keys, pieces_of
 
 if TYPE_CHECKING:
     from logger.exchange.layer import Layer
-    from logger.fleet.dataset import Engine
     from logger.fleet.ingest import Keyed
-    from logger.fleet.road_map import RoadPieces
     from logger.fleet.summary import FleetFigures
 
 _ROADS = "roads.geojson"
@@ -60,7 +60,6 @@ class FleetSummary(CommandResult):
 
 def ingested(question: IngestQuestion) -> Ingested:
     """The answer to ``IngestQuestion``, which says what is raised."""
-    from logger.files import note
     from logger.fleet.ingest import ingest_sessions, keep_names, own_key, pseudonym, sessions_of
     from logger.fleet.page import ingest_json, ingest_words
     from logger.store.log.log_reader import find_logs_in
@@ -130,7 +129,6 @@ fleet_report = function("fleet_report", ReportQuestion, reported)
 def _summarised(question: SummariseQuestion | ReportQuestion, by: str
                 ) -> Iterator[tuple[FleetFigures, Engine, RoadPieces | None]]:
     """Figures, the engine that made them, and the map of the dataset."""
-    from logger.fleet.dataset import opened
     from logger.fleet.ingest import names_of, shown_car
     from logger.fleet.summary import summarise
 
@@ -155,7 +153,6 @@ def _summarised(question: SummariseQuestion | ReportQuestion, by: str
 
 def _pieces(dataset: Dataset) -> RoadPieces | None:
     """The pieces of the map that a dataset was made with."""
-    from logger.fleet.road_map import pieces_of
     from logger.store.formats.road_lines import read_road_lines
 
     return pieces_of(read_road_lines(dataset.folder / _ROADS)) if dataset.manifest.roads else None
@@ -164,8 +161,6 @@ def _pieces(dataset: Dataset) -> RoadPieces | None:
 @contextmanager
 def _keys(dataset: Dataset, roads: Path | None) -> Iterator[tuple[Keyed, str]]:
     """How keys are made, and the SHA-256 of the map."""
-    from logger.files import read_bounded, replace_bytes
-    from logger.fleet.road_map import RoadMap, cell_keys, pieces_of
     from logger.store.formats.road_lines import MAX_BYTES, read_road_lines
 
     if roads is None and not dataset.manifest.roads:

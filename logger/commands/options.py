@@ -15,7 +15,7 @@ from contextlib import contextmanager
 from dataclasses import MISSING
 from pathlib import Path
 from types import NoneType
-from typing import TYPE_CHECKING, Any, get_args
+from typing import Any, get_args
 
 from logger.api.question import (
     Argument,
@@ -32,17 +32,14 @@ from logger.api.question import (
     askings,
     help_of,
 )
-from logger.api.shown import check_outs
+from logger.api.shown import CommandResult, check_outs
+from logger.chart_data import Chart
 from logger.errors import BadInput, CheckFailed
 from logger.files import together, write_file
 from logger.printable import printable, word
-from logger.report.charts import ENDINGS
+from logger.report.charts import ENDINGS, drawn
 from logger.report.quantities import WIDTH
 from logger.units import LENGTH_UNITS_M
-
-if TYPE_CHECKING:
-    from logger.api.shown import CommandResult
-    from logger.chart_data import Chart
 
 
 class QuestionVerb:
@@ -279,8 +276,6 @@ def write_result(paths: Sequence[Path], found: CommandResult, of: str) -> None:
 def _drawn(path: Path, charts: Sequence[Chart]) -> bytes:
     if not charts:
         raise BadInput(f"--out {path}: expected a result with pictures, found one without; {PAGE} holds its words")
-    from logger.report.charts import drawn
-
     return drawn(charts, path)
 
 
