@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import isfinite
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -39,6 +38,7 @@ from logger.estimation.sensor_noise import NOISE_MPS2, Sensor
 from logger.files import make_folder, together, write_text
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
+from logger.report.quantities import known
 from logger.runs import SKIP_S, UNKNOWN, begins_freely
 from logger.runs import Run as Record
 from logger.simulation.virtual_drive import SimulatedRuns
@@ -391,7 +391,7 @@ def _rows(found: Assessment) -> Iterator[dict[str, Any]]:
         "limit_std_m_per_km": found.least_error_m_per_km,
     } | ({"iri_exact_m_per_km": found.exact_m_per_km} if found.compared else {})
     for *values, flags in zip(*(column.tolist() for column in columns.values()), windows.flags, strict=True):
-        row = {name: value if isfinite(value) else None for name, value in zip(columns, values, strict=True)}
+        row = {name: known(value) for name, value in zip(columns, values, strict=True)}
         yield row | {"flags": sorted(flags)}
 
 

@@ -29,6 +29,7 @@ from logger.api.extraction import read_measured_profile
 from logger.chart_data import Array, Curves, Line
 from logger.errors import BadInput
 from logger.extraction.along_track import MeasuredLine, passes
+from logger.report.quantities import known as known_number
 from logger.roads.repeated_drives import Agreement, agreement, factor_to
 from logger.shipped import vehicle_path
 from logger.store.formats.drive_file import write_table
@@ -269,7 +270,7 @@ def _row(road: str, what: str, found: Agreement | None) -> tuple[Cell, ...]:
     if found is None:
         return (road, what, 0.0, None, None, None, None, None, None)
     numbers = (found.r2, found.r2_log, found.mae_m_per_km, found.bias, found.within_one, found.within_two)
-    return (road, what, float(found.windows), *(one if np.isfinite(one) else None for one in numbers))
+    return (road, what, float(found.windows), *map(known_number, numbers))
 
 
 def along(part: Compared) -> Curves:

@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-import time
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -22,6 +21,7 @@ from drivers.accelerometers import line_reader
 from drivers.dump import DumpHeader, DumpWriter, Event
 from drivers.hardware import BytePort, open_serial, port_advice
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
+from logger.service.main_loop import monotonic_us as now_us
 from logger.service.systemd_notify import stopped_by_signals
 from logger.units import US_PER_S
 
@@ -149,7 +149,3 @@ def _hex_rows(data: bytes) -> list[str]:
     return [f"  {data[start:start + 16].hex(' '):47}  "
             + "".join(chr(byte) if 32 <= byte < 127 else "." for byte in data[start:start + 16])
             for start in range(0, len(data), 16)]
-
-
-def now_us() -> int:
-    return time.monotonic_ns() // 1000

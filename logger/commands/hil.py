@@ -20,7 +20,6 @@ import sys
 import time
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
-from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -33,10 +32,12 @@ from logger.commands.options import on_screen, wipe
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
 from logger.estimation.receiver_delay import CarriedDelay
 from logger.records import WindowRecord
+from logger.report.quantities import known
 from logger.service.config import Config, find_config, load_config
 from logger.service.hil.log_comparison import Difference, LogAgreement, compare, newest_sidecar, read_sessions
 from logger.service.hil.playback import Sent, Wired, expected_rows, send, wired
 from logger.service.learning import DELAY, NOISE, KnownNoise, read_delay
+from logger.service.main_loop import monotonic_us
 
 LATE_MS = 50.0
 LATE_WHY = "the service reads its ports that often"
@@ -164,7 +165,7 @@ def _play(args: argparse.Namespace, config: Config) -> Sent:
             stack.callback(ports[source].close)
             print(f"{source} to {name} at {bauds[source]} baud", file=sys.stderr)
         try:
-            return send(recording.events, ports, _now_us, time.sleep, _show)
+            return send(recording.events, ports, monotonic_us, time.sleep, _show)
         finally:
             wipe()
 
@@ -175,10 +176,6 @@ def _wired(args: argparse.Namespace, reader: DumpReader) -> Wired:
 
 def _show(played_s: float) -> None:
     on_screen()(f"playing: {played_s:.0f} s")
-
-
-def _now_us() -> int:
-    return time.monotonic_ns() // 1000
 
 
 def _sent_json(sent: Sent | None, in_time: bool) -> dict[str, Any] | None:
@@ -194,19 +191,15 @@ def _agreement_json(agreement: LogAgreement | None) -> dict[str, Any] | None:
         return None
     fields = asdict(agreement)
     for name in ("clock_shift_s", "moved_before_m"):
-        fields[name] = _number(fields[name])
+        fields[name] = known(fields[name])
     fields["differences"] = [
         {"quantity": each.tolerance.quantity, "unit": each.tolerance.unit, "compared": each.compared,
-         "p95": _number(each.p95), "largest": _number(each.largest), "tolerance": each.tolerance.least,
+         "p95": known(each.p95), "largest": known(each.largest), "tolerance": each.tolerance.least,
          "or_share": each.tolerance.share, "of": each.tolerance.of, "outside": each.outside, "ok": each.ok,
          "why": each.tolerance.why}
         for each in agreement.differences
     ]
     return {"ok": agreement.ok, **fields}
-
-
-def _number(value: float) -> float | None:
-    return value if isfinite(value) else None
 
 
 def _agreement_text(agreement: LogAgreement) -> list[str]:

@@ -90,9 +90,9 @@ def signal_errors(errors: Mapping[str, Sequence[float]], words: str) -> list[str
     return [f"Errors of the other signals: {each}."] if each else []
 
 
-def known(value: float) -> float | None:
+def known(value: float | None) -> float | None:
     """A number for a program; None (null) where it is not known."""
-    return float(value) if isfinite(value) else None
+    return None if value is None or not isfinite(value) else float(value)
 
 
 @dataclass(frozen=True)

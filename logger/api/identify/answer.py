@@ -56,6 +56,7 @@ from logger.identification.unknown_road.road_fit import RoadFit, fit_roads
 from logger.lab.readings_fit import ReadingsFit, fit_to_readings
 from logger.left_out import LeftOut, left_out_json, left_out_paragraph
 from logger.profiles.track import Track
+from logger.report.quantities import known as known_number
 from logger.runs import Run as Record
 from logger.runs import runs_left_out, unknown_past_s
 from logger.simulation.virtual_drive import SimulatedRuns
@@ -656,7 +657,8 @@ def unmeasured_json(fit: RoadFit, free: Sequence[Free]) -> dict[str, Any]:
     """All of it for a program."""
     return {
         "parameters": fit.parameters, "standard_errors": fit.standard_errors,
-        "error_before": _finite(fit.error_before), "error_after": _finite(fit.error_after), "converged": fit.converged,
+        "error_before": known_number(fit.error_before), "error_after": known_number(fit.error_after),
+        "converged": fit.converged,
         "start": {one.name: one.start for one in free}, "bounds": {one.name: [one.low, one.high] for one in free},
         "road": fit.roads, "road_standard_errors": fit.road_errors,
         "correlation": {first: {second: float(value) for second, value in zip(fit.names, row, strict=True)}
@@ -712,10 +714,6 @@ def _unmeasured_limits(fit: RoadFit, free: Sequence[Free]) -> Iterator[str]:
 def _correlation(fit: RoadFit) -> np.ndarray:
     deviations = np.sqrt(np.maximum(np.diag(fit.covariance), 1e-300))
     return np.asarray(fit.covariance / np.outer(deviations, deviations))
-
-
-def _finite(error: float) -> float | None:
-    return error if np.isfinite(error) else None
 
 
 _LAGS, _MOST_PAIRS = 50, 12

@@ -29,7 +29,7 @@ from logger.api.lab.words import (
 from logger.api.question import function, named_numbers
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
-from logger.chart_data import Chart, Curves, Line, line
+from logger.chart_data import Array, Chart, Curves, Line, line
 from logger.identification.noise_models import rms
 from logger.lab.another_car import POOR_ERROR
 from logger.lab.compare import LabComparison, Standing
@@ -42,7 +42,7 @@ from logger.lab.selection.holdout import JUDGED_ON, fit_percent
 from logger.left_out import left_out_json, left_out_paragraph
 from logger.report import document as doc
 from logger.report.charts import chart
-from logger.report.quantities import chance, columns, finite, numbers_of, signal_errors, unit_of, wrapped
+from logger.report.quantities import chance, columns, finite, known, numbers_of, signal_errors, unit_of, wrapped
 from logger.runs import Run, are_on_rig, normalised_rms_error, runs_left_out, short_names
 from logger.store.formats import vehicle_file
 from logger.vehicle.effect import Effect
@@ -291,7 +291,7 @@ def _standing_json(standing: Standing) -> dict[str, Any]:
     residuals, where = standing.residuals, standing.where
     return {
         "error": standing.error, "signals": dict(standing.signals),
-        "runs": [{"run": run.name, "error": _finite(normalised_rms_error([run], [prediction])),
+        "runs": [{"run": run.name, "error": known(normalised_rms_error([run], [prediction])),
                   "samples": run.count - run.first}
                  for run, prediction in zip(residuals.runs, residuals.predictions, strict=True)],
         "where": {
@@ -305,17 +305,13 @@ def _standing_json(standing: Standing) -> dict[str, Any]:
 
 
 def _part_json(part: Part, unit: str) -> dict[str, Any]:
-    return {f"from_{unit}": part.low, f"to_{unit}": part.high, "error": _finite(part.error),
+    return {f"from_{unit}": part.low, f"to_{unit}": part.high, "error": known(part.error),
             "error_power_share": part.share}
 
 
 def _test_json(test: ResidualTestResult, found: bool) -> dict[str, Any]:
-    return {"name": test.name, "found": found, "value": _finite(test.value), "unit": test.unit,
-            "standard_error": _finite(test.standard_error), "p_value": _finite(test.p_value)}
-
-
-def _finite(value: float | None) -> float | None:
-    return None if value is None or not np.isfinite(value) else value
+    return {"name": test.name, "found": found, "value": known(test.value), "unit": test.unit,
+            "standard_error": known(test.standard_error), "p_value": known(test.p_value)}
 
 
 _PLACES = 5
@@ -415,12 +411,16 @@ def whole_drives(residuals: ModelResiduals) -> doc.Html:
 
 def _worst_place(standing: Standing) -> doc.Html:
     residuals, worst = standing.residuals, worst_moment(standing)
-    index, part = worst.run, worst.part
-    time_s = (residuals.runs[index].first + np.arange(len(residuals.residual[index])))[part] / residuals.rate_hz
-    lines = tuple(Line(name, time_s, values[index][part]) for name, values in (
-        ("measured", residuals.measured), ("residual", residuals.residual), ("model", residuals.model)))
-    drawn = Curves(worst.words, "time [s]", _axis(residuals.runs[index]), lines)
-    return doc.section("The worst place", chart(drawn))
+    return doc.section("The worst place", moment_chart(worst.words, residuals, worst, {
+        "measured": residuals.measured, "residual": residuals.residual, "model": residuals.model}))
+
+
+def moment_chart(title: str, residuals: ModelResiduals, at: Moment, signals: Mapping[str, Sequence[Array]]) -> doc.Html:
+    """Signals of the runs, by name and (n,) each, at a moment."""
+    run = residuals.runs[at.run]
+    time_s = (run.first + np.arange(len(residuals.residual[at.run])))[at.part] / residuals.rate_hz
+    return chart(Curves(title, "time [s]", _axis(run), tuple(
+        Line(name, time_s, values[at.run][at.part]) for name, values in signals.items())))
 
 
 def spectra_section(residuals: ModelResiduals) -> doc.Html:
@@ -428,17 +428,22 @@ def spectra_section(residuals: ModelResiduals) -> doc.Html:
     return doc.section("By frequency", doc.concatenated(map(chart, spectra(residuals))))
 
 
+def decibels(residuals: ModelResiduals, signals: Sequence[Array]) -> Array:
+    """Power spectral density of a signal of the runs, (n,) each, at ``frequencies`` [dB re 1 unit2/Hz]."""
+    density = np.mean(np.abs(segments(residuals, signals)) ** 2, axis=0) / frequencies(residuals)[1]
+    return np.asarray(np.maximum(10 * np.log10(np.maximum(density, 1e-30)), _QUIET_DB))
+
+
 def spectra(residuals: ModelResiduals) -> tuple[Curves, Curves]:
     """The charts of it: of the body, and of the wheels and above."""
     f_hz, unit = frequencies(residuals), residuals.unit
-    density = [np.mean(np.abs(segments(residuals, one)) ** 2, axis=0) / f_hz[1]
-               for one in (residuals.measured, residuals.residual, residuals.model)]
+    levels_db = [decibels(residuals, one) for one in (residuals.measured, residuals.residual, residuals.model)]
 
     def drawn(title: str, low_hz: float, high_hz: float) -> Curves:
         inside = (f_hz >= max(low_hz, f_hz[1])) & (f_hz <= high_hz)
         return Curves(title, "frequency [Hz]", f"power spectral density [dB re 1 ({unit})2/Hz]", tuple(
-            Line(name, f_hz[inside], np.maximum(10 * np.log10(np.maximum(one[inside], 1e-30)), _QUIET_DB))
-            for name, one in zip(("measured", "residual", "model"), density, strict=True)))
+            Line(name, f_hz[inside], one[inside])
+            for name, one in zip(("measured", "residual", "model"), levels_db, strict=True)))
 
     return drawn("The body", 0.0, _BODY_HZ), drawn("Wheels and above", _BODY_HZ, f_hz[-1])
 

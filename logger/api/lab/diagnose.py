@@ -29,6 +29,7 @@ from logger.api.lab.words import (
     removed_json,
     removed_section,
     removed_words,
+    steps_table,
 )
 from logger.api.lab.words import looks_like as residual_looks_like
 from logger.api.question import Notify, Runs, each, function, silent
@@ -592,7 +593,8 @@ def page(found: LabDiagnosis, vehicle: str) -> doc.Html:
         doc.heading(title, ", ".join(found.runs)),
         _tiles(found), doc.paragraphs(diagnosis_summary(found)), removed_section(found.removed, found.band),
         shape_sections(found),
-        doc.section("NRMSE, model by model", _diagnosis_steps(found)), car_sections(found),
+        doc.section("NRMSE, model by model", steps_table([(one.words, one.error) for one in found.steps],
+                                                         found.noise_floor_error)), car_sections(found),
         doc.section("All candidates", _candidates(found)),
         doc.section("What these runs cannot tell", doc.bullets(untested(found))),
         doc.section("Sources", doc.bullets(sources(found))),
@@ -634,13 +636,6 @@ def _tiles(found: LabDiagnosis) -> doc.Html:
         *drift_tile(found.removed),
         ("Noise floor", f"{found.noise_floor_error:.3f}", "NRMSE"),
     ])
-
-
-def _diagnosis_steps(found: LabDiagnosis) -> doc.Html:
-    drawn = falling(f"NRMSE on {JUDGED_ON}", [(step.words, step.error) for step in found.steps],
-                    found.noise_floor_error)
-    rows = [(f"{number}", step.words, f"{step.error:.4f}") for number, step in enumerate(found.steps)]
-    return drawn + doc.grid(("Step", "Model", "NRMSE"), rows, words=(0, 1))
 
 
 def _candidates(found: LabDiagnosis) -> doc.Html:

@@ -25,7 +25,7 @@ from logger.api.lab.diagnose import (
 )
 from logger.api.lab.learn import law_lines, law_sections, learned, picture_of, sentences, source_of, why_none, with_law
 from logger.api.lab.question import LabLoopQuestion
-from logger.api.lab.words import falling
+from logger.api.lab.words import falling, steps_table
 from logger.api.question import Notify, function
 from logger.api.shown import CommandResult, check_out
 from logger.api.vehicles import Model, model_of, read_vehicle
@@ -34,7 +34,7 @@ from logger.errors import BadInput
 from logger.estimation.batch import Assessment, figures
 from logger.files import make_folder, write_text
 from logger.lab import compare, diagnosis
-from logger.lab.residuals.breakdown import ModelResiduals, frequencies, segments
+from logger.lab.residuals.breakdown import ModelResiduals, frequencies
 from logger.lab.selection.add_effect import AddedEffects
 from logger.lab.selection.holdout import JUDGED_ON
 from logger.lab.session import LawSearch, Round, Story
@@ -348,7 +348,6 @@ def as_json(story: Story) -> dict[str, Any]:
 STEPS_HINT = ("From step 1 on, the lab refits the model's parameters and the distances within their tolerance. With "
               "the files and distances as they are, the NRMSE is larger.")
 _HIGHEST_OF_RATE = 0.4
-_QUIET_DB = -80.0
 
 
 def story_page(story: Story) -> doc.Html:
@@ -388,9 +387,7 @@ def _story_tiles(story: Story) -> doc.Html:
 
 
 def _steps(story: Story) -> doc.Html:
-    rows = [(f"{number}", words, f"{error:.4f}") for number, (words, error) in enumerate(steps(story))]
-    return (falling(f"NRMSE on {JUDGED_ON}", steps(story), story.floor)
-            + doc.grid(("Step", "Model", "NRMSE"), rows, words=(0, 1)) + doc.hint(STEPS_HINT))
+    return steps_table(steps(story), story.floor) + doc.hint(STEPS_HINT)
 
 
 def _law(story: Story) -> list[doc.Html]:
@@ -429,8 +426,7 @@ def residual_spectra(story: Story) -> doc.Html:
 
     def line(name: str, residuals: ModelResiduals, measured: bool) -> Line:
         signals = residuals.measured if measured else residuals.residual
-        power = np.mean(np.abs(segments(residuals, signals)) ** 2, axis=0) / f_hz[1]
-        return Line(name, f_hz[kept], np.maximum(10 * np.log10(np.maximum(power[kept], 1e-30)), _QUIET_DB))
+        return Line(name, f_hz[kept], comparing.decibels(residuals, signals)[kept])
 
     lines = (line("measured", before, True), line("residual initially", before, False),
              line("residual finally", after, False))
@@ -442,15 +438,9 @@ def _place(story: Story) -> doc.Html:
     """The place that was worst at first, then and now."""
     before, after = story.first.refitted, story.last.refitted
     worst, residuals = comparing.worst_moment(before), before.residuals
-    index, part = worst.run, worst.part
-    residual = residuals.residual[index]
-    time_s = (residuals.runs[index].first + np.arange(len(residual)))[part] / residuals.rate_hz
-    lines = (Line("measured", time_s, residuals.measured[index][part]),
-             Line("residual initially", time_s, residual[part]),
-             Line("residual finally", time_s, after.residuals.residual[index][part]))
-    main = residuals.runs[index].facts.main
-    title = f"The worst place initially: {worst.words}"
-    return chart(Curves(title, "time [s]", f"{main.measures} [{main.unit}]", lines))
+    return comparing.moment_chart(f"The worst place initially: {worst.words}", residuals, worst, {
+        "measured": residuals.measured, "residual initially": residuals.residual,
+        "residual finally": after.residuals.residual})
 
 
 HEADS = ("IRI", "Mean [m/km]", "Bias", "R2", "Within 1", "Within 2")

@@ -204,6 +204,12 @@ def band_json(band: ComparedBand | None) -> dict[str, Any]:
     return {"pass_band_hz": [band.low_hz, band.high_hz], "low_passed_at_hz": band.cutoff_hz}
 
 
+def steps_table(steps: Sequence[tuple[str, float]], floor: float) -> Html:
+    """The error of each step on what no fit saw, as a falling curve and as a table."""
+    rows = [(f"{number}", words, f"{error:.4f}") for number, (words, error) in enumerate(steps)]
+    return falling(f"NRMSE on {JUDGED_ON}", steps, floor) + grid(("Step", "Model", "NRMSE"), rows, words=(0, 1))
+
+
 def falling(title: str, steps: Sequence[tuple[str, float]], floor: float) -> Html:
     """The error of each step as a falling curve, down to the noise."""
     return steps_figure(Steps(title, "NRMSE", tuple(steps), (floor, "noise floor")))
