@@ -56,12 +56,12 @@ def bounds(reading_mps2: Array, at_end: Array, step_mps2: float) -> tuple[Array,
     return low, high
 
 
-def unexplained(fitted_mps2: Array, low: Array, high: Array, sensor: Sensor) -> float:
+def unexplained(fitted_mps2: Array, low: Array, high: Array, noise_variance: float) -> float:
     """Variance by which a solution misses its bounds (t,) more than noise would [(m/s2)2]: it is not settled yet, or
     the car is not the one in the file. Without it such a solution would take every bound that it misses for a sharp
     reading, and settle ever less."""
     missed = np.maximum(np.maximum(low - fitted_mps2, fitted_mps2 - high), 0.0)
-    return max(float(np.mean(missed**2)) - sensor.noise_rms_mps2**2, 0.0) if len(missed) else 0.0
+    return max(float(np.mean(missed**2)) - noise_variance, 0.0) if len(missed) else 0.0
 
 
 def cavity(motion: SteadyMotion, variance: Array) -> tuple[Array, Array]:
@@ -133,21 +133,21 @@ def without_own(readings: GaussianReadings, fitted_mps2: Array, fitted_variance:
 
 def improved(
     readings: GaussianReadings, low: Array, high: Array, fitted_mps2: Array, fitted_variance: Array | float,
-    sensor: Sensor
+    noise_variance: float
 ) -> GaussianReadings:
     """One round.
 
     low, high          (t,) bounds of each reading [m/s2]
     fitted_mps2        (t,) what the solution with ``readings`` says of each acceleration
     fitted_variance    of that, (t,) or one for all [(m/s2)2]
+    noise_variance     of a reading before it is rounded [(m/s2)2]
     """
-    noise = sensor.noise_rms_mps2**2
     own = 1 / readings.variance
     expected, others = without_own(readings, fitted_mps2, fitted_variance)
-    spread = others + noise
+    spread = others + noise_variance
     mean, variance = within(expected, spread, low, high)
     precision = np.maximum(1 / variance - 1 / spread, 1e-9 / spread)
     value = (mean / variance - expected / spread) / precision
-    new = 1 / (1 / precision + noise)
+    new = 1 / (1 / precision + noise_variance)
     total = (1 - _KEPT) * new + _KEPT * own
     return GaussianReadings(((1 - _KEPT) * value * new + _KEPT * readings.value_mps2 * own) / total, 1 / total)

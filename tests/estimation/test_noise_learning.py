@@ -101,7 +101,7 @@ def test_settled_rounds_give_the_slope_of_the_exact_evidence(noise: float, devia
             variance = 1 / (deviation**-2 + (1 / readings.variance).sum())
             fitted = np.full(30, variance * (readings.value_mps2 / readings.variance).sum())
             expected, others = without_own(readings, fitted, variance)
-            readings = improved(readings, low, high, fitted, variance, sensor)
+            readings = improved(readings, low, high, fitted, variance, sensor.noise_rms_mps2**2)
         at = np.log(noise)
         either = interval_evidence(expected, others, low, high, np.array([at - H, at + H]))
         found = (either[1] - either[0]) / (2 * H)

@@ -33,7 +33,7 @@ def by_rounds(
     for _ in range(rounds):
         variance = 1 / (deviation**-2 + (1 / readings.variance).sum())
         mean = variance * (readings.value_mps2 / readings.variance).sum()
-        readings = improved(readings, low, high, np.full(len(reading), mean), variance, sensor)
+        readings = improved(readings, low, high, np.full(len(reading), mean), variance, sensor.noise_rms_mps2**2)
     return mean, np.sqrt(variance)
 
 
@@ -82,7 +82,7 @@ def test_two_neighbours_that_go_together() -> None:
     for _ in range(40):
         covariance = np.linalg.inv(np.linalg.inv(prior) + np.diag(1 / readings.variance))
         fitted = covariance @ (readings.value_mps2 / readings.variance)
-        readings = improved(readings, low, high, fitted, covariance[0, 0], COARSE)
+        readings = improved(readings, low, high, fitted, covariance[0, 0], COARSE.noise_rms_mps2**2)
     assert fitted == pytest.approx([mean, mean], abs=0.005)
     assert np.sqrt(covariance[0, 0]) == pytest.approx(np.sqrt(alone @ (axis - mean) ** 2), rel=0.02)
 
@@ -110,7 +110,7 @@ def test_a_solution_far_from_the_readings_stays_finite(off: float) -> None:
     low, high = bounds(reading, np.zeros(2), COARSE.step_mps2)
     readings = first_guess(reading, COARSE)
     for _ in range(5):
-        readings = improved(readings, low, high, reading + off, 1e-4, COARSE)
+        readings = improved(readings, low, high, reading + off, 1e-4, COARSE.noise_rms_mps2**2)
         assert np.isfinite(readings.value_mps2).all() and (readings.variance > 0).all()
 
 
@@ -134,7 +134,7 @@ def test_what_noise_explains_is_not_unexplained() -> None:
     true = rng.uniform(-4, 4, 20_000)
     reading = 0.6 * np.round((true + 0.1 * rng.standard_normal(20_000)) / 0.6)
     low, high = bounds(reading, np.zeros(20_000), 0.6)
-    assert unexplained(true, low, high, COARSE) == 0.0
-    assert 0.3**2 < unexplained(true + rng.choice([-0.7, 0.7], 20_000), low, high, COARSE) < 0.7**2
-    assert unexplained(true + 100.0, low, high, COARSE) == pytest.approx(100.0**2, rel=0.01)
-    assert unexplained(true[:0], low[:0], high[:0], COARSE) == 0.0
+    assert unexplained(true, low, high, COARSE.noise_rms_mps2**2) == 0.0
+    assert 0.3**2 < unexplained(true + rng.choice([-0.7, 0.7], 20_000), low, high, COARSE.noise_rms_mps2**2) < 0.7**2
+    assert unexplained(true + 100.0, low, high, COARSE.noise_rms_mps2**2) == pytest.approx(100.0**2, rel=0.01)
+    assert unexplained(true[:0], low[:0], high[:0], COARSE.noise_rms_mps2**2) == 0.0
