@@ -177,22 +177,23 @@ def _looked_at(one: _Rubs, ease: float) -> float:
     return _GROWS_AT + (_RUBS_AT - _GROWS_AT) * sudden
 
 
-def _asked(structure: Structure, laws: Sequence[CornerLaws], way: Way) -> Asked | None:
-    """Laws by all that moves as the loop reads them; None where there are none."""
-    if not any(one.motions for one in laws):
-        return None
+def _asked(structure: Structure, laws: Sequence[CornerLaws], way: Way) -> Asked:
+    """Laws by all that moves as the loop reads them; where there are none it asks for no place and no time."""
     from logger.vehicle.stepping_loop import ANSWERS, FELT, address_of, numbers_in_order
 
-    whole, numbers, memories = [], [0.0], []
+    whole, numbers, memories = list[list[int]](), [0.0], list[list[float]]()
     for i, corner in enumerate(laws):
         for one in corner.motions:
             whole.append([address_of(one), i, one.between.value, len(numbers), len(one.memory)])
             numbers += numbers_in_order(one)
             memories.append([*one.memory, *[0.0] * (MOST_MEMORY - len(one.memory))])
-    places = way.distance_m[:, None] - structure.behind_m
-    return (np.array(whole, dtype=np.int64), np.array(numbers, dtype=float), np.zeros((len(whole), FELT)),
-            np.array(memories, dtype=float), np.zeros(FELT), np.zeros(FELT + MOST_MEMORY), np.zeros(ANSWERS), places,
-            np.stack([way.time_s, np.gradient(way.distance_m, way.time_s), np.full(len(way.time_s), way.run)], axis=1))
+    places, clock = np.empty((len(way.time_s), len(structure.behind_m))), np.empty((len(way.time_s), 3))
+    if whole:
+        places[:] = way.distance_m[:, None] - structure.behind_m
+        clock.T[:] = way.time_s, np.gradient(way.distance_m, way.time_s), np.full(len(way.time_s), way.run)
+    return (np.array(whole, dtype=np.int64).reshape(-1, 5), np.array(numbers, float), np.zeros((len(whole), FELT)),
+            np.array(memories, float).reshape(-1, MOST_MEMORY), np.zeros(FELT), np.zeros(FELT + MOST_MEMORY),
+            np.zeros(ANSWERS), places, clock)
 
 
 def _tabulated(

@@ -418,7 +418,7 @@ def _answer(forces: Array, motion: Array, m: int, w: int, asked: Asked, road: Ar
 def _settle(
     motion: Array, m: int, before: Array, forces: Array, by_force: Array, tables: Array, pairs: Array, numbers: Array,
     passes: int, rubs: Array, rubs_at: Whole, sweeps: int, road: Array, mounts: Array, step_s: float, earlier: Array,
-    asked: Asked | None, k: int,
+    asked: Asked, k: int,
 ) -> None:
     """Find the forces at the end of step k (2 w + f) from those at its beginning, and the motion there.
 
@@ -436,8 +436,7 @@ def _settle(
             forces[i] = _suspension(i, tables, pairs, numbers, motion[m + i], motion[m + w + i], mounts, step_s)
             forces[w + i] = _tire(i, tables, numbers, motion[m + 2 * w + i] - road[i],
                                   motion[m + 3 * w + i] - road[w + i])
-        if asked is not None:
-            _answer(forces, motion, m, w, asked, road, k, step_s)
+        _answer(forces, motion, m, w, asked, road, k, step_s)
     if len(rubs):
         _sum(motion, seen, before, forces, 2 * w, by_force)
         _rub(motion, m, forces, w, rubs, rubs_at, by_force, earlier, sweeps)
@@ -449,14 +448,13 @@ def _walk(
     by_known: Array, by_force: Array, step_s: float, tables: Array, pairs: Array, numbers: Array, around: Array,
     elevation: Array, states: Array, recorded: Array, known: Array, before: Array, nothing: Array, motion: Array,
     forces: Array, road: Array, mounts: Array, earlier: Array, passes: int, rubs: Array, rubs_at: Whole, sweeps: int,
-    asked: Asked | None,
+    asked: Asked,
 ) -> None:
     """Fill in the states and what is recorded, from the first state on; the arrays after these are for keeping what a
     step needs."""
     count, m, w, u = len(elevation), states.shape[1], len(numbers), elevation.shape[1]
     for k in range(count - 1):
-        if asked is not None:
-            _begin(motion, m, w, asked, road, k)
+        _begin(motion, m, w, asked, road, k)
         for i in range(u):
             known[m + 2 * w + i] = around[k + 1, i]
             known[m + 2 * w + u + i] = 0.25 * (around[k + 2, i] - around[k, i])
@@ -489,7 +487,7 @@ def _walk(
 @_compiled_with_arrays
 def steps(
     by_known: Array, by_force: Array, step_s: float, tables: Array, pairs: Array, numbers: Array, rubs: Array,
-    rubs_at: Whole, asked: Asked | None, start: Array, m: int, around: Array, elevation: Array,
+    rubs_at: Whole, asked: Asked, start: Array, m: int, around: Array, elevation: Array,
 ) -> tuple[Array, Array]:
     """States (M, 2 n) and forces of the laws (M, 2 w); see ``stepping.march``.
 
@@ -502,7 +500,7 @@ def steps(
     by_force     (2 w + f, R) the same by the laws' forces at the end, then by dry friction
     tables       (4, w, points) laws of one variable; pairs (w, travels, rates) of two; numbers (w, 12)
     rubs         (f, 3) numbers of what rubs; rubs_at (f, 3) its places
-    asked        laws by all that moves; None: there are none, and a loop without them runs
+    asked        laws by all that moves
     start        (R,) the first motion, of which m make the state
     around       (M + 1, u) means of the inputs before, in and after the steps
     elevation    (M, u) inputs at the instants
@@ -513,7 +511,7 @@ def steps(
     known, before = np.zeros(len(by_known)), np.zeros(by_known.shape[1])
     known[:m] = start[:m]
     road = np.concatenate((elevation[0, :w], (around[1, :w] - around[0, :w]) / step_s))
-    acts = (numbers[:, : PAIR + 1].any() or numbers[:, TIRE_DAMPING].any() or asked is not None
+    acts = (numbers[:, : PAIR + 1].any() or numbers[:, TIRE_DAMPING].any() or len(asked[0]) > 0
             or not np.isinf(numbers[:, MOST_PULL_N]).all())
     passes = _PASSES if acts else 0
     sweeps = 1 if (rubs_at[:, ON_TIRE] < 0).all() else _SWEEPS
