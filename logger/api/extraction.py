@@ -22,23 +22,8 @@ from logger.arrays import Array, Bools
 from logger.errors import BadInput
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.receiver_delay import CarriedDelay, combined
-from logger.extraction.along_track import (
-    ASIDE_M,
-    GPS_PLACE_M,
-    NEAREST_FIXES_S,
-    MeasuredLine,
-    Observations,
-    Pass,
-    Predict,
-    Registered,
-    RunGrid,
-    TrackMotion,
-    goes_back,
-    motion_of,
-    passes,
-    registered,
-    run_grid,
-)
+from logger.extraction import along_track
+from logger.extraction.along_track import registered
 from logger.extraction.recorded_columns import fix_times_s, stretches
 from logger.files import make_folder, remove_file, together
 from logger.left_out import LeftOut, counting
@@ -217,14 +202,14 @@ class MeasuredProfile:
 
     path: Path
     profile: Wheelpaths
-    line: MeasuredLine
+    line: along_track.MeasuredLine
 
 
 def read_measured_profile(path: Path) -> MeasuredProfile:
     """A profile with ``lat_deg,lon_deg``. Raises BadInput for one that is not what it should be."""
     profile, places = read_profile(path, judged=True), read_places(path)
     try:
-        return MeasuredProfile(path, profile, MeasuredLine.of(*places))
+        return MeasuredProfile(path, profile, along_track.MeasuredLine.of(*places))
     except ValueError as error:
         raise BadInput(f"{path}: {error}") from None
 
@@ -277,7 +262,7 @@ def apart(time_s: Array) -> Bools:
     """Which fixes (k,) come after those that are taken before them by as much as fixes do."""
     taken, last_s = np.zeros(len(time_s), dtype=np.bool_), -np.inf
     for index, fix_s in enumerate(time_s.tolist()):
-        if fix_s > last_s + NEAREST_FIXES_S:
+        if fix_s > last_s + along_track.NEAREST_FIXES_S:
             taken[index], last_s = True, fix_s
     return taken
 
@@ -345,7 +330,7 @@ class _Drive:
     distance_m: Array
     lat_deg: Array
     lon_deg: Array
-    registered: Registered | None
+    registered: along_track.Registered | None
 
 
 def even_drives(recorded: Recorded, source: Path) -> list[drive_file.Drive]:
@@ -387,43 +372,44 @@ def _drives(recorded: Recorded, measured: MeasuredProfile | None) -> tuple[list[
         LeftOut(long_s - kept_s, "s", "without a good reading: the sensor gave none, or clipped")))
 
 
-def _off_the_line(line: MeasuredLine, driven_m: Array, along_m: Array, aside_m: Array) -> str:
+def _off_the_line(line: along_track.MeasuredLine, driven_m: Array, along_m: Array, aside_m: Array) -> str:
     """Why a drive, by fixes (k,), has no pass over a line."""
-    if goes_back(driven_m, along_m, aside_m):
+    if along_track.goes_back(driven_m, along_m, aside_m):
         return ": the drive goes along the profile from its end to its beginning"
-    near = aside_m <= ASIDE_M
+    near = aside_m <= along_track.ASIDE_M
     if not near.any():
         return f": the nearest fix is {aside_m.min():.0f} m from it"
     near_m = np.diff(driven_m)[near[1:] & near[:-1]].sum()
-    return (f": only {near_m:.0f} m of the drive are within {ASIDE_M:g} m of its {np.ptp(line.distance_m):.0f} m")
+    return (f": only {near_m:.0f} m of the drive are within {along_track.ASIDE_M:g} m of its "
+            f"{np.ptp(line.distance_m):.0f} m")
 
 
 def _along(recorded: Recorded, fixes: Fixes, measured: MeasuredProfile | None) -> list[_Drive]:
     """The runs of a stretch without a break: one, or one for each pass over the profile."""
     speeds = _speeds(fixes, recorded.config)
-    motion = motion_of(speeds)
+    motion = along_track.motion_of(speeds)
     if measured is None:
         return [_drive(_readings(recorded, fixes), fixes, motion, recorded.config.gps.antenna_behind_front_axle_m)]
     driven_m = motion.state[:, 0]
     along_m, aside_m = measured.line.passed(fixes.lat_deg, fixes.lon_deg)
-    found = passes(driven_m, along_m, aside_m)
+    found = along_track.passes(driven_m, along_m, aside_m)
     if not found:
         recorded.hint = _off_the_line(measured.line, driven_m, along_m, aside_m)
     return [one for each in found if (one := _on_profile(recorded, fixes, along_m, each, measured)) is not None]
 
 
-def _speeds(fixes: Fixes, config: Config) -> Observations:
+def _speeds(fixes: Fixes, config: Config) -> along_track.Observations:
     speed_mps = np.where(fixes.speed_mps < config.pipeline.stationary_mps, 0.0, fixes.speed_mps)
-    return Observations(fixes.time_s, speed_mps, np.ones(len(speed_mps)))
+    return along_track.Observations(fixes.time_s, speed_mps, np.ones(len(speed_mps)))
 
 
-def _on_profile(recorded: Recorded, fixes: Fixes, along_m: Array, one: Pass, measured: MeasuredProfile
+def _on_profile(recorded: Recorded, fixes: Fixes, along_m: Array, one: along_track.Pass, measured: MeasuredProfile
                 ) -> _Drive | None:
     """A pass, laid on the profile's distance and cut to it; None for one that is too short."""
     part = slice(one.first, one.last)
     fixes, along_m = fixes.part(part), along_m[part]
     ahead_m = recorded.config.gps.antenna_behind_front_axle_m
-    places = Observations(fixes.time_s, along_m + ahead_m, np.full(len(along_m), GPS_PLACE_M))
+    places = along_track.Observations(fixes.time_s, along_m + ahead_m, np.full(len(along_m), along_track.GPS_PLACE_M))
     grid, accel, usable = readings = _readings(recorded, fixes)
     if len(accel) < 2:
         return None
@@ -437,7 +423,7 @@ def _on_profile(recorded: Recorded, fixes: Fixes, along_m: Array, one: Pass, mea
     return replace(drive, **{name: getattr(drive, name)[inside] for name in names})
 
 
-def _predictor(recorded: Recorded, time_s: Array, track: Any) -> Predict:
+def _predictor(recorded: Recorded, time_s: Array, track: Any) -> along_track.Predict:
     car = compose(recorded.model.vehicle, recorded.model.effects)
     nothing = np.zeros(len(time_s))
 
@@ -448,8 +434,8 @@ def _predictor(recorded: Recorded, time_s: Array, track: Any) -> Predict:
     return predict
 
 
-def _drive(readings: tuple[RunGrid, Array, Array], fixes: Fixes, motion: TrackMotion, ahead_m: float = 0.0,
-           registered: Registered | None = None) -> _Drive:
+def _drive(readings: tuple[along_track.RunGrid, Array, Array], fixes: Fixes, motion: along_track.TrackMotion,
+           ahead_m: float = 0.0, registered: along_track.Registered | None = None) -> _Drive:
     """Readings as ``_readings`` gives them, with their motion; the front tires are so far ahead of it [m]."""
     grid, accel, usable = readings
     at_s = grid.taken_s
@@ -458,7 +444,7 @@ def _drive(readings: tuple[RunGrid, Array, Array], fixes: Fixes, motion: TrackMo
                   np.interp(at_s, fixes.time_s, fixes.lat_deg), (lon_deg + 180.0) % 360.0 - 180.0, registered)
 
 
-def _readings(recorded: Recorded, fixes: Fixes) -> tuple[RunGrid, Array, Array]:
+def _readings(recorded: Recorded, fixes: Fixes) -> tuple[along_track.RunGrid, Array, Array]:
     """Samples on the grid of a run, within the fixes: accelerations without gravity and offset, and how usable they
     are, (n,) each."""
     readings = recorded.readings
@@ -468,7 +454,7 @@ def _readings(recorded: Recorded, fixes: Fixes) -> tuple[RunGrid, Array, Array]:
     whole = present & ~clipped
     usable = np.where(present, np.where(clipped, CLIPPED, READING), NO_READING)
     accel = accel - (accel[whole].mean() if whole.any() else 0.0)
-    grid = run_grid(readings.time_s[inside], RATE_HZ)
+    grid = along_track.run_grid(readings.time_s[inside], RATE_HZ)
     return grid, grid.laid(accel), np.where(grid.row >= 0, usable[grid.row], NO_READING)
 
 
@@ -501,7 +487,7 @@ def _written(folder: Path, drive: _Drive, recorded: Recorded, measured: Measured
                         by_road, receiver.delay_s, receiver.std_s, scale, gaps)
 
 
-def _place_std_m(found: Registered, drive: _Drive, receiver: CarriedDelay) -> float:
+def _place_std_m(found: along_track.Registered, drive: _Drive, receiver: CarriedDelay) -> float:
     """By the receiver alone, what it is late by is a length as well."""
     late_m = 0.0 if found.by_road else receiver.std_s * float(np.sqrt(np.mean(drive.speed_mps**2)))
     return float(np.hypot(found.place_std_m, late_m))

@@ -41,20 +41,8 @@ from logger.fleet.summary import (
 from logger.geodesy import EARTH_RADIUS_M
 from logger.left_out import LeftOut, left_out_json, left_out_lines
 from logger.printable import counted
-from logger.report.document import (
-    EMPTY,
-    Html,
-    asset,
-    concatenated,
-    data_block,
-    document,
-    grid,
-    heading,
-    hint,
-    html,
-    section,
-    tiles,
-)
+from logger.report import document as doc
+from logger.report.document import tiles
 from logger.report.placed import damaged
 from logger.report.quantities import known
 from logger.report.summary import distance_words
@@ -342,7 +330,7 @@ _MODES = (("m", "Mean IRI"), ("w", "Roughest"), ("t", "Became worse"))
 _HINT = "Tap or click a piece of road for its figures; zoom in for finer pieces."
 
 
-def fleet_page(figures: FleetFigures, sections: RoadTable) -> Html:
+def fleet_page(figures: FleetFigures, sections: RoadTable) -> doc.Html:
     """The page of figures by segment; ``sections``: the same by 0.1 mi, for the lists."""
     segments = figures.roads
     first, last = utc(int(segments.last_us.min())), utc(int(segments.last_us.max()))
@@ -353,13 +341,14 @@ def fleet_page(figures: FleetFigures, sections: RoadTable) -> Html:
     data = {"box": [float(x.min()), float(y.min()), float(x.max()), float(y.max())], "levels": level,
             "deepest": DEEPEST, "roots": names_of(x, y, level), "segment_m": SEGMENT_M,
             "limits": list(_LIMITS_M_PER_KM)}
-    return document("A fleet's roads", [heading("A fleet's roads", under), _tiles(figures, sections), _map(),
-                                        _rough(sections), _worse(sections), _cars(figures), data_block("data", data)],
-                    style=asset("page.css") + _STYLE, loads=True, script='"use strict";\n'
-                    + "".join(map(asset, _SHARED)) + asset("fleet.js", "logger.fleet"))
+    return doc.document("A fleet's roads", [doc.heading("A fleet's roads", under), _tiles(figures, sections), _map(),
+                                            _rough(sections), _worse(sections), _cars(figures),
+                                            doc.data_block("data", data)],
+                        style=doc.asset("page.css") + _STYLE, loads=True, script='"use strict";\n'
+                        + "".join(map(doc.asset, _SHARED)) + doc.asset("fleet.js", "logger.fleet"))
 
 
-def _tiles(figures: FleetFigures, sections: RoadTable) -> Html:
+def _tiles(figures: FleetFigures, sections: RoadTable) -> doc.Html:
     segments, growth = figures.roads, figures.biases.growth_per_year
     mean = float(np.average(segments.iri_m_per_km, weights=segments.length_m))
     return tiles([
@@ -372,14 +361,14 @@ def _tiles(figures: FleetFigures, sections: RoadTable) -> Html:
     ])
 
 
-def _map() -> Html:
-    buttons = concatenated(html('<button type="button" data-mode="{}" aria-pressed="{}">{}</button>', name,
-                                "true" if name == "m" else "false", words) for name, words in _MODES)
+def _map() -> doc.Html:
+    buttons = doc.concatenated(doc.html('<button type="button" data-mode="{}" aria-pressed="{}">{}</button>', name,
+                                        "true" if name == "m" else "false", words) for name, words in _MODES)
     good, fair = _LIMITS_M_PER_KM
     ranges = (f"below {good:.2f}", f"{good:.2f} to {fair:.2f}", f"above {fair:.2f}")
-    legend = concatenated(html('<li><i class="f{}"></i>{}, {} m/km</li>', rank, *words)
-                          for rank, words in enumerate(zip(FEDERAL_WORDS, ranges, strict=True)))
-    return section("Map", html(
+    legend = doc.concatenated(doc.html('<li><i class="f{}"></i>{}, {} m/km</li>', rank, *words)
+                              for rank, words in enumerate(zip(FEDERAL_WORDS, ranges, strict=True)))
+    return doc.section("Map", doc.html(
         '<noscript><p class="warn">The map is drawn by a script, which this browser does not run.</p></noscript>'
         '<div class="switch" role="group" aria-label="What the colours of the map show">{}</div>'
         '<div class="picture" id="map"><canvas tabindex="0" role="application" aria-label="Map of the roads. Arrow '
@@ -392,12 +381,12 @@ def _map() -> Html:
         '<p class="hint" id="hint">{}</p></div></div>', buttons, legend, _HINT))
 
 
-def _place(sections: RoadTable, one: int) -> Html:
-    return html('<button type="button" data-lat="{0:.6f}" data-lon="{1:.6f}">{0:.5f}, {1:.5f}</button>',
-                float(sections.lat_deg[one]), float(sections.lon_deg[one]))
+def _place(sections: RoadTable, one: int) -> doc.Html:
+    return doc.html('<button type="button" data-lat="{0:.6f}" data-lon="{1:.6f}">{0:.5f}, {1:.5f}</button>',
+                    float(sections.lat_deg[one]), float(sections.lon_deg[one]))
 
 
-def _rough(sections: RoadTable) -> Html:
+def _rough(sections: RoadTable) -> doc.Html:
     order = np.flatnonzero(sections.visit != "")
     order = order[np.argsort(-sections.iri_m_per_km[order], kind="stable")][:_SHOWN].tolist()
     rows = [(_place(sections, one), f"{sections.iri_m_per_km[one]:.2f} {error_words(sections.iri_std_m_per_km[one])}",
@@ -406,30 +395,30 @@ def _rough(sections: RoadTable) -> Html:
     heads = ("Place", "IRI [m/km]", "Length [m]", "Cars", "Passes", "Last seen", "Why")
     none = ("No section is rough, worse or uncomfortable." if np.isfinite(sections.iri_std_m_per_km).any() else
             "Too few drives to be certain of any section.")
-    return section("To visit", grid(heads, rows, words=(0, 5, 6)) + hint(
+    return doc.section("To visit", doc.grid(heads, rows, words=(0, 5, 6)) + doc.hint(
         "Sections of 0.1 mi, one direction each. Rough: above 170 in/mi with 95 % certainty; worse: its change is "
         "significant; uncomfortable: 0.8 m/s² and more. Cars and passes: the fewest cars and the mean passes of its "
-        "segments.")) if rows else section("To visit", html('<p class="empty">{}</p>', none))
+        "segments.")) if rows else doc.section("To visit", doc.html('<p class="empty">{}</p>', none))
 
 
-def _worse(sections: RoadTable) -> Html:
+def _worse(sections: RoadTable) -> doc.Html:
     order = np.flatnonzero(sections.worse)
     order = order[np.argsort(sections.p_value[order], kind="stable")][:_SHOWN].tolist()
     rows = [(_place(sections, one), f"{sections.iri_m_per_km[one]:.2f}",
              f"{sections.trend_m_per_km_per_year[one]:+.2f} ± {sections.trend_std_m_per_km_per_year[one]:.2f}",
              f"{sections.p_value[one]:.1g}") for one in order]
-    return section("Became worse", grid(("Place", "IRI [m/km]", "A year [m/km]", "p"), rows) + hint(
+    return doc.section("Became worse", doc.grid(("Place", "IRI [m/km]", "A year [m/km]", "p"), rows) + doc.hint(
         f"The {len(rows)} most certain of {int(sections.worse.sum()):,}; at most {FALSE_SHARE:.0%} of all that are "
-        "called worse are false (Benjamini and Hochberg 1995).")) if rows else EMPTY
+        "called worse are false (Benjamini and Hochberg 1995).")) if rows else doc.EMPTY
 
 
-def _cars(figures: FleetFigures) -> Html:
+def _cars(figures: FleetFigures) -> doc.Html:
     biases = figures.biases
     order = np.argsort(-np.abs(biases.gain - 1.0) * biases.known, kind="stable")[:_SHOWN].tolist()
     rows = [(figures.names[one], f"{biases.gain[one] - 1.0:+.1%} ± "
              f"{biases.gain[one] * biases.log_std[one]:.1%}" if biases.known[one] else "not known",
              f"{figures.car_passes[one]:,.0f}") for one in order]
-    return section("Cars", grid(("Car", "Reads", "Passes"), rows) + hint(not_known(figures) or (
+    return doc.section("Cars", doc.grid(("Car", "Reads", "Passes"), rows) + doc.hint(not_known(figures) or (
         "Bias of a car on the roads that it shares with others, relative to the mean car; the figures above are "
         "corrected for it. Cars that differ from the mean car come first.")))
 

@@ -12,20 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from logger.api.lab import words as lab_words
 from logger.api.lab.bench import Bench, bench_with, slow_words
 from logger.api.lab.question import AddEffectQuestion, CompareQuestion, LabQuestion
-from logger.api.lab.words import (
-    band_json,
-    drift_tile,
-    error_text,
-    error_words,
-    errors_json,
-    falling,
-    paired,
-    removed_json,
-    removed_section,
-    removed_words,
-)
 from logger.api.question import function, named_numbers
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
@@ -135,7 +124,7 @@ class AddedEffect(CommandResult):
 
     def figures(self) -> list[doc.Html]:
         """How the error fell."""
-        return [falling("NRMSE, model by model", [
+        return [lab_words.falling("NRMSE, model by model", [
             ("file unchanged", self.error_before), ("parameters refitted", self.error_refitted),
             (f"with {self.effect}", self.error_after)], self.noise_floor_error)]
 
@@ -201,10 +190,10 @@ def headline(found: LabComparison) -> list[str]:
                      "power.")
     else:
         lines.append(f"{refit} leaves it at {after:.3f}: small errors in the parameters are not the cause.")
-    lines += error_words(found.steps, found.floor)
+    lines += lab_words.error_words(found.steps, found.floor)
     lines += signal_errors({name: (error, refitted.signals[name]) for name, error in plain.signals.items()},
                            "{}, refitted {}")
-    lines += removed_words(found.removed, found.band)
+    lines += lab_words.removed_words(found.removed, found.band)
     if found.repeats is not None:
         apart = found.repeats.deviation_mps2
         lines.append(f"{' and '.join(found.repeats.names)} are repeats and differ by {apart:.2g} {unit} r.m.s. from "
@@ -277,8 +266,8 @@ def comparison_json(found: LabComparison) -> dict[str, Any]:
     return {
         **_standing_json(found.plain), **left_out_json(runs_left_out(found.plain.residuals.runs)),
         "evidence": [conclusion(found), *headline(found), *evidence(found), next_step(found)],
-        "missing": found.missing, **band_json(found.band), **removed_json(found.removed),
-        **errors_json(found.steps, found.floor),
+        "missing": found.missing, **lab_words.band_json(found.band), **lab_words.removed_json(found.removed),
+        **lab_words.errors_json(found.steps, found.floor),
         "refitted": {**_standing_json(found.refitted), "error": found.steps[-1].error,
                      "shifts": dict(found.moves), "shifted_far": list(found.far)},
         "repeats": None if found.repeats is None else {
@@ -338,7 +327,7 @@ def _comparison_tables(found: LabComparison) -> list[str]:
     for title, unit, one, other in (
         ("Frequency", "Hz", plain.frequency, refitted.frequency), ("Speed", "m/s", plain.speed, refitted.speed),
     ):
-        lines += [title, *(_row(a, b, unit) for a, b in paired(one, other))] if other else []
+        lines += [title, *(_row(a, b, unit) for a, b in lab_words.paired(one, other))] if other else []
     main = found.plain.residuals.runs[0].facts.main
     lines += [f"Model's {main.measures}", *(_row(None, part, main.unit) for part in refitted.amplitude)]
     names = short_names(found.plain.residuals.runs)
@@ -348,13 +337,13 @@ def _comparison_tables(found: LabComparison) -> list[str]:
 
 def _row(plain: Part | None, refitted: Part, unit: str) -> str:
     name = f"  {refitted.low:.3g} to {refitted.high:.3g} {unit}" + (f" {refitted.name}" if refitted.name else "")
-    share, error = (f"{plain.share:.1%}", error_text(plain, 3)) if plain else ("", "")
-    return f"{name:46}{share:>6}{refitted.share:>7.1%}{error:>8}{error_text(refitted, 3):>8}"
+    share, error = (f"{plain.share:.1%}", lab_words.error_text(plain, 3)) if plain else ("", "")
+    return f"{name:46}{share:>6}{refitted.share:>7.1%}{error:>8}{lab_words.error_text(refitted, 3):>8}"
 
 
 def _place(part: Part, run: str) -> str:
     name = f"  {run}, {part.low:g} to {part.high:g} m"
-    return f"{name:46}{'':6}{part.share:>7.1%}{'':8}{error_text(part, 3):>8}"
+    return f"{name:46}{'':6}{part.share:>7.1%}{'':8}{lab_words.error_text(part, 3):>8}"
 
 
 _BODY_HZ = 5.0
@@ -371,7 +360,7 @@ def page(found: LabComparison) -> doc.Html:
         doc.heading(title, ", ".join(run.name for run in residuals.runs)), _tiles(found),
         doc.paragraphs([conclusion(found), *headline(found)]),
         doc.section("After the refit", doc.bullets(evidence(found)) + doc.paragraphs([next_step(found)])),
-        removed_section(found.removed, found.band),
+        lab_words.removed_section(found.removed, found.band),
         whole_drives(residuals), _worst_place(found.refitted), spectra_section(residuals),
         _comparison_page_tables(found),
         _places(found.refitted),
@@ -383,7 +372,7 @@ def _tiles(found: LabComparison) -> doc.Html:
     residuals = found.plain.residuals
     return doc.tiles([("NRMSE, file unchanged", f"{found.plain.error:.3f}", ""),
                       ("NRMSE refitted", f"{found.steps[-1].error:.3f}", JUDGED_ON),
-                      *drift_tile(found.removed),
+                      *lab_words.drift_tile(found.removed),
                       ("Residual tests that find something", f"{len(found.tests_found)}",
                        f"of {len(found.tests.tests)}"),
                       ("Runs",
@@ -459,7 +448,7 @@ def _places(standing: Standing) -> doc.Html:
                               np.array([part.residual_mps2 for part in parts])))
     along = Curves("Residual along the road", "distance [m]", f"residual, r.m.s. [{unit}]", tuple(lines))
     rows = [(names[part.name], f"{part.low:g} to {part.high:g}", f"{part.share:.1%}", f"{part.residual_mps2:.3g}",
-             error_text(part, 2)) for part in standing.where.worst_places(_WORST)]
+             lab_words.error_text(part, 2)) for part in standing.where.worst_places(_WORST)]
     return doc.section("By place", (chart(along) if lines else doc.EMPTY) + doc.grid(
         ("Run", "From, to [m]", "Share of the residual", f"Residual [{unit}]", "NRMSE"), rows))
 
@@ -504,15 +493,16 @@ def _comparison_page_tables(found: LabComparison) -> doc.Html:
 
 def _table(title: str, unit: str, plain: Sequence[Part], refitted: Sequence[Part]) -> doc.Html:
     """Shares and errors of both standings; the bounds of the parts are those of the refitted one."""
-    pairs = paired(plain, refitted)
+    pairs = lab_words.paired(plain, refitted)
     named, stands = bool(refitted[0].name), any(one is not None for one, _ in pairs)
 
     def cells(one: Part | None, part: Part) -> doc.Html:
         bar = doc.html('<td class="bar"><span class="f0" style="width:{:.1%}"></span></td>', part.share)
-        before = doc.html("<td class=n>{}</td>", error_text(one, 3) if one else "") if stands else doc.EMPTY
+        before = doc.html("<td class=n>{}</td>", lab_words.error_text(one, 3) if one else "") if stands else doc.EMPTY
         return ((doc.html("<td>{}</td>", part.name) if named else doc.EMPTY)
                 + doc.html("<td class=n>{:.3g} to {:.3g}</td>", part.low, part.high) + bar
-                + doc.html("<td class=n>{:.1%}</td><td class=n>{}</td>", part.share, error_text(part, 3)) + before)
+                + doc.html("<td class=n>{:.1%}</td><td class=n>{}</td>", part.share,
+                           lab_words.error_text(part, 3)) + before)
 
     heads = ((doc.Html("<th>Band</th>") if named else doc.EMPTY) + doc.html("<th class=n>From, to [{}]</th>", unit)
              + doc.Html("<th>Share of the residual</th><th></th><th class=n>NRMSE refitted</th>")
@@ -600,7 +590,7 @@ def errors(found: AddedEffects) -> list[tuple[str, float, str]]:
 
 def judgement(found: AddedEffects) -> list[str]:
     """The effect's numbers, and whether it is to be kept."""
-    lines = [*removed_words(found.removed, found.band)]
+    lines = [*lab_words.removed_words(found.removed, found.band)]
     lines += [f"{one.effect.name}: {numbers_of(one) or one.effect.title}." for one in found.new]
     lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
                            "{} refitted without it, {} with it, noise floor about {}")
@@ -612,7 +602,7 @@ def judgement(found: AddedEffects) -> list[str]:
             lines.append(f"At its bound: {', '.join(at)}. The bound stopped the fit there; it is not a measured value.")
     if found.helps:
         lines.append(f"It helps: the probability that noise alone improves the fit as much is {chance(found.p_value)}.")
-        lines += error_words(found.steps, found.noise_floor_error)[1:]
+        lines += lab_words.error_words(found.steps, found.noise_floor_error)[1:]
     elif found.gains:
         lines.append("WARNING: it does not help. The fit improves by more than noise alone would, but the NRMSE on "
                      f"{JUDGED_ON} rises from {found.error_refitted:.4f} to {found.error_after:.4f}, and so does the "
@@ -674,8 +664,8 @@ def addition_json(found: AddedEffects) -> dict[str, Any]:
         "effect": new.effect.name, "parameters": dict(new.values), "standard_errors": finite(new.standard_errors),
         "error_before": found.error_before, "error_after": found.error_after,
         "error_refitted": found.error_refitted, "error_as_written": found.error_as_written,
-        **errors_json(found.steps, found.noise_floor_error),
-        **band_json(found.band), **removed_json(found.removed), "tolerance": found.tolerance,
+        **lab_words.errors_json(found.steps, found.noise_floor_error),
+        **lab_words.band_json(found.band), **lab_words.removed_json(found.removed), "tolerance": found.tolerance,
         "noise_floor_error": found.noise_floor_error, "p_value": found.p_value, "helps": found.helps,
         "vehicle_parameters": [
             {"name": one.name, "nominal": one.nominal, "without": one.without,

@@ -12,25 +12,9 @@ from typing import Any
 from drivers.disk import FileSystem
 from logger.printable import counted
 from logger.store.log import atomic_file
+from logger.store.log import sidecar as sidecars
 from logger.store.log.log_name import COUNTER, LogName, OwnFile, finished_path, open_path, sidecar_path
 from logger.store.log.row_format import HEADER, as_now, format_row
-from logger.store.log.sidecar import (
-    SETTINGS_LOST,
-    UNCHECKED,
-    ClockMap,
-    Hole,
-    IntactRow,
-    IntactRows,
-    Tally,
-    clock_of,
-    load_sidecar,
-    read_sidecar,
-    repairs_of,
-    sidecar_or_nothing,
-    store_sidecar,
-    take_tally,
-    without_utc,
-)
 
 
 @dataclass(frozen=True)
@@ -42,7 +26,7 @@ class Repaired:
 
     part: Path
     finished: Path | None
-    tally: Tally
+    tally: sidecars.Tally
     problem: str = ""
 
     @property
@@ -101,7 +85,7 @@ def _clear(files: FileSystem, path: Path, warn: atomic_file.Warn) -> None:
 def _remove_lone(files: FileSystem, sidecar: Path, warn: atomic_file.Warn) -> None:
     """Remove the sidecar of a part that had no name yet. That of a finished log that was taken away stays."""
     try:
-        said = (read_sidecar(sidecar, files) or {}).get("log")
+        said = (sidecars.read_sidecar(sidecar, files) or {}).get("log")
         if isinstance(said, dict) and said.get("state") == "open":
             files.remove(sidecar)
     except (ValueError, OSError) as error:
@@ -113,25 +97,26 @@ def _repair_session(files: FileSystem, logs: Sequence[Path], warn: atomic_file.W
     """Finish the open parts of a session, of which these are all files. Its newest clock is that of the last part
     which knows one; finished files get it first, for it is lost with the last part."""
     parts = sorted((path for path in logs if path.suffix == ".part"), key=_place)
-    clocks = [clock for part in parts if (clock := clock_of(sidecar_or_nothing(part, files))) is not None]
+    clocks = [clock
+              for part in parts if (clock := sidecars.clock_of(sidecars.sidecar_or_nothing(part, files))) is not None]
     clock = clocks[-1] if clocks else None
     try:
         for finished in sorted(set(logs).difference(parts)):
             if clock is not None and _may_lack_utc(files, finished):
                 _fill_if_readable(files, finished, clock, warn)
     except OSError as error:
-        return [Repaired(part, None, Tally(), atomic_file.file_words(error)) for part in parts]
+        return [Repaired(part, None, sidecars.Tally(), atomic_file.file_words(error)) for part in parts]
     later = first_segments_later(files, logs) if parts else {}
     done = []
     for part in parts:
         try:
             done.append(repair_part(files, part, later[part], clock, warn))
         except OSError as error:
-            done.append(Repaired(part, None, Tally(), atomic_file.file_words(error)))
+            done.append(Repaired(part, None, sidecars.Tally(), atomic_file.file_words(error)))
     return done
 
 
-def _fill_if_readable(files: FileSystem, finished: Path, clock: ClockMap, warn: atomic_file.Warn) -> None:
+def _fill_if_readable(files: FileSystem, finished: Path, clock: sidecars.ClockMap, warn: atomic_file.Warn) -> None:
     """Give a finished file its UTC; one that cannot be read does not get it, and keeps no other from being finished."""
     try:
         tally = tally_of(files, finished)
@@ -141,13 +126,13 @@ def _fill_if_readable(files: FileSystem, finished: Path, clock: ClockMap, warn: 
         fill_finished(files, finished, tally, clock, warn)
 
 
-def repair_part(files: FileSystem, part: Path, limit: int | None, clock: ClockMap | None,
+def repair_part(files: FileSystem, part: Path, limit: int | None, clock: sidecars.ClockMap | None,
                 warn: atomic_file.Warn = atomic_file.warn_in_journal) -> Repaired:
     """Finish one part, but for its rows of segments from ``limit`` on. A finished file of the same name is merged."""
     finished = finished_path(part)
     logs = (finished, part) if atomic_file.is_taken(finished) else (part,)
-    found = IntactRows(files, logs, limit)
-    tally = take_tally(found)
+    found = sidecars.IntactRows(files, logs, limit)
+    tally = sidecars.take_tally(found)
     if len(logs) > 1 and not (found.only_in_last or tally.contradictions or _is_damaged(files, finished)):
         # The cut came between the rename and the removal. After a mere kill the rename may not be on the disk yet, and
         # the removal must not come there before it.
@@ -169,19 +154,19 @@ def repair_part(files: FileSystem, part: Path, limit: int | None, clock: ClockMa
 
 
 def _is_damaged(files: FileSystem, finished: Path) -> bool:
-    found = IntactRows(files, (finished,))
-    tally = take_tally(found)
+    found = sidecars.IntactRows(files, (finished,))
+    tally = sidecars.take_tally(found)
     return bool(tally.damaged_lines or tally.torn_tail)
 
 
-def _explains_a_gap(files: FileSystem, part: Path, tally: Tally, limit: int | None) -> bool:
+def _explains_a_gap(files: FileSystem, part: Path, tally: sidecars.Tally, limit: int | None) -> bool:
     """True for a part without an intact row that has to stay, to say why rows are missing between its neighbours."""
     if limit is None or not tally.damaged_rows:
         return False
     earlier = sorted((log for log in logs_of_session(part) if _place(log) < _place(part)), key=_place, reverse=True)
     for log in earlier:
         last = None
-        for row in IntactRows(files, (log,)):
+        for row in sidecars.IntactRows(files, (log,)):
             last = row.record.segment
         if last is not None:
             return last + 1 < limit
@@ -205,7 +190,7 @@ def first_segments_later(files: FileSystem, logs: Iterable[Path]) -> dict[Path, 
             part, limit = _place(log)[0], upcoming
         found[log] = limit
         with suppress(OSError):  # what nobody can read is not there twice either
-            upcoming = next((row.record.segment for row in IntactRows(files, (log,))), upcoming)
+            upcoming = next((row.record.segment for row in sidecars.IntactRows(files, (log,))), upcoming)
     return found
 
 
@@ -217,18 +202,19 @@ def _place(log: Path) -> tuple[int, Path]:
 
 def _may_lack_utc(files: FileSystem, finished: Path) -> bool:
     """False where the sidecar says that no row does."""
-    said = sidecar_or_nothing(finished, files).get("log")
+    said = sidecars.sidecar_or_nothing(finished, files).get("log")
     return not isinstance(said, dict) or said.get("rows_without_utc") != 0
 
 
-def finish_part(files: FileSystem, part: Path, given: dict[str, Any], tally: Tally, clock: ClockMap | None) -> Path:
+def finish_part(files: FileSystem, part: Path, given: dict[str, Any], tally: sidecars.Tally, clock: sidecars.ClockMap
+                | None) -> Path:
     """Turn a part that was written whole and synced into the finished file."""
     if clock is not None and tally.unset:
         finished = _finish_copy(files, part, (part,), given, tally, clock, None)
         files.remove(part)
     else:
         finished = finished_path(part)
-        store_sidecar(files, part, given, "finished", tally, clock)
+        sidecars.store_sidecar(files, part, given, "finished", tally, clock)
         files.rename(part, finished)
     files.sync_directory(part.parent)
     return finished
@@ -237,61 +223,62 @@ def finish_part(files: FileSystem, part: Path, given: dict[str, Any], tally: Tal
 def _facts_of(files: FileSystem, log: Path, warn: atomic_file.Warn) -> dict[str, Any]:
     """What a new sidecar of a log takes over from its old one. One that is damaged or cannot be read is put aside."""
     try:
-        sidecar = load_sidecar(log, files)
+        sidecar = sidecars.load_sidecar(log, files)
     except ValueError as error:
         why = f"damaged: {error}"
     except OSError as error:
         why = atomic_file.disk_words(error)
     else:
         if sidecar is None:
-            return {SETTINGS_LOST: True}
-        return sidecar.content if sidecar.is_checked else sidecar.content | {UNCHECKED: True}
+            return {sidecars.SETTINGS_LOST: True}
+        return sidecar.content if sidecar.is_checked else sidecar.content | {sidecars.UNCHECKED: True}
     atomic_file.set_aside(files, sidecar_path(log), f"{why}; {finished_path(log).name} has lost its settings and clock",
                           warn)
-    return {SETTINGS_LOST: True}
+    return {sidecars.SETTINGS_LOST: True}
 
 
-def _finish_copy(files: FileSystem, part: Path, logs: Sequence[Path], given: dict[str, Any], tally: Tally,
-                 clock: ClockMap | None, limit: int | None) -> Path:
+def _finish_copy(files: FileSystem, part: Path, logs: Sequence[Path], given: dict[str, Any], tally: sidecars.Tally,
+                 clock: sidecars.ClockMap | None, limit: int | None) -> Path:
     """Put the intact rows of a part, or of the part and the finished file that is there, into a finished file; the part
     is still there. They are rewritten: of a part that was found open nobody knows whether the disk holds what the
     system shows."""
     finished = finished_path(part)
     filled = tally if clock is None else replace(tally, unset=0)
     if limit is not None and not tally.rows:
-        filled = replace(filled, holes=(Hole(limit - tally.damaged_rows, limit - 1),))
-    temporary = atomic_file.write_temporary(files, finished, _lines(IntactRows(files, logs, limit), clock))
-    store_sidecar(files, part, given, "finished", filled, clock)
+        filled = replace(filled, holes=(sidecars.Hole(limit - tally.damaged_rows, limit - 1),))
+    temporary = atomic_file.write_temporary(files, finished, _lines(sidecars.IntactRows(files, logs, limit), clock))
+    sidecars.store_sidecar(files, part, given, "finished", filled, clock)
     files.rename(temporary, finished)
     files.sync_directory(part.parent)
     return finished
 
 
-def fill_finished(files: FileSystem, finished: Path, tally: Tally, clock: ClockMap | None,
+def fill_finished(files: FileSystem, finished: Path, tally: sidecars.Tally, clock: sidecars.ClockMap | None,
                   warn: atomic_file.Warn = atomic_file.warn_in_journal) -> None:
     """Give UTC to the rows of a finished file that have none. What earlier repairs left out of it is still known."""
     if clock is None or not tally.unset:
         return
     given = _facts_of(files, finished, warn)
-    before = repairs_of(given)
-    atomic_file.replace_file(files, finished, _lines(IntactRows(files, (finished,)), clock))
-    store_sidecar(files, finished, given, "finished", replace(
+    before = sidecars.repairs_of(given)
+    atomic_file.replace_file(files, finished, _lines(sidecars.IntactRows(files, (finished,)), clock))
+    sidecars.store_sidecar(files, finished, given, "finished", replace(
         tally, unset=0, damaged_lines=tally.damaged_lines + before.damaged_lines,
         torn_tail=tally.torn_tail or before.torn_tail, holes=before.holes + tally.holes), clock)
 
 
-def tally_of(files: FileSystem, log: Path) -> Tally:
+def tally_of(files: FileSystem, log: Path) -> sidecars.Tally:
     """Count what one file holds. Raises ``OSError``."""
-    return take_tally(IntactRows(files, (log,)))
+    return sidecars.take_tally(sidecars.IntactRows(files, (log,)))
 
 
-def _lines(rows: Iterable[IntactRow], clock: ClockMap | None) -> Iterator[bytes]:
+def _lines(rows: Iterable[sidecars.IntactRow], clock: sidecars.ClockMap | None) -> Iterator[bytes]:
     """The text of a log with these rows, UTC filled in, in blocks."""
     block_rows = 256
     lines = [HEADER]
     for row in rows:
         lines.append(as_now(row.text, row.record) if clock is None or row.record.utc_us is not None
-                     else format_row(replace(without_utc(row.record), utc_us=row.record.t_us + clock.offset_us)))
+                     else format_row(replace(sidecars.without_utc(row.record), utc_us=row.record.t_us
+                                             + clock.offset_us)))
         if len(lines) >= block_rows:
             yield _joined(lines)
             lines.clear()
