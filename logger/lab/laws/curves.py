@@ -8,7 +8,6 @@ each of them counts. Beyond the motions of the runs curves stay what they are th
 
 from __future__ import annotations
 
-from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -17,8 +16,6 @@ import numpy as np
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
-_STRONGEST = 100.0
-_SLOPE_STEP = 0.02
 _POINTS = {"curve": (0.5, 0.9, 0.995), "long_curve": (0.5, 0.9, 0.99, 0.999)}
 """Shares of the time within which a motion stays: where free curves have their points. A spring that stiffens at the
 ends of its travel does most where it hardly ever is."""
@@ -62,6 +59,8 @@ class CurveFamily(Family):
 
     motion               that it depends on
     force                what it is in words: "damper force"
+    answers              number of an axle that gives such a force where it is multiplied with the motion
+    tried                share of that force that the search begins with
     usual_share          of the time that the motion stays within where the force is what its number says
     reach_share          of the time; beyond twice what this gives, the force stays as it is there
     powers               to be tried; ``power_ends``: what they may be
@@ -71,6 +70,8 @@ class CurveFamily(Family):
 
     motion: LawMotion
     force: str
+    answers: str
+    tried: float = 0.3
     usual_share: float = 0.98
     reach_share: float = 0.9999
     powers: tuple[float, ...] = (2.0, 3.0)
@@ -78,16 +79,12 @@ class CurveFamily(Family):
     ends: tuple[tuple[int, str], ...]
     straight_at = 1.0
 
-    @abstractmethod
-    def usual_force_n(self, context: LawContext, usual: float) -> float:
-        """Usual size of such a force where the motion is ``usual`` [N]."""
-
     def drafts(self, context: LawContext) -> list[Draft]:
         def reach(share: float) -> float:
             return context.reach(self.motion.measure, share)
 
         usual = reach(self.usual_share)
-        size_n = self.usual_force_n(context, usual)
+        size_n = self.tried * getattr(context.vehicle.front, self.answers) * usual
         return [self._power(usual, 2 * reach(self.reach_share), size_n),
                 *(self._free(variant, [reach(share) for share in shares], size_n)
                   for variant, shares in _POINTS.items())]
@@ -149,5 +146,5 @@ def force_n(p, at):
 
 def _strength(name: str, size_n: float, meaning: str, trials: Sequence[float] = (0.1, -0.1)) -> Parameter:
     size_n = rounded(size_n)
-    return Parameter(name, trials[0] * size_n, -_STRONGEST * size_n, _STRONGEST * size_n, 0.0, Scale.LINEAR,
-                     tuple(one * size_n for one in trials), meaning, step=_SLOPE_STEP * size_n)
+    return Parameter(name, trials[0] * size_n, -100 * size_n, 100 * size_n, 0.0, Scale.LINEAR,
+                     tuple(one * size_n for one in trials), meaning, step=0.02 * size_n)

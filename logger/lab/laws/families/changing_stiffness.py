@@ -18,7 +18,6 @@ _METHOD = """def laws(self, p, laws):
     own = SimpleNamespace(changed_n_per_m=p.changed_n_per_m, time_s=p.time_s)
     return laws.with_law(Between.{between}, changed, own)
 """
-_TRIED, _MOST_LOST, _MOST = 0.1, 0.9, 3.0  # of the stiffness: tried, and what may be lost or come
 _OF = {"springs": ("travel_m", "BODY_AND_WHEEL", "the body bounces"),
        "tires": ("deflection_m", "WHEEL_AND_GROUND", "the wheels hop")}
 
@@ -44,7 +43,7 @@ class ChangingStiffness(Family):
 def _draft(of: str, stiffness_n_per_m: float, lasts_s: float) -> Draft:
     motion, between, what = _OF[of]
     times = tuple(rounded(share * lasts_s) for share in (0.1, 0.3, 1.0))
-    size, lost, most = (rounded(share * stiffness_n_per_m) for share in (_TRIED, _MOST_LOST, _MOST))
+    size, lost, most = (rounded(share * stiffness_n_per_m) for share in (0.1, 0.9, 3.0))
     parameters = (
         Parameter("changed_n_per_m", size, -lost, most, 0.0, Scale.LINEAR, (size, -size),
                   f"by which the stiffness of the {of} changes in the end", step=rounded(0.1 * size)),

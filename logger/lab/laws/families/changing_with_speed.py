@@ -35,7 +35,6 @@ _DAMPING_METHOD = """def laws(self, p, laws):
 """
 _TRIED = 0.2  # of the damping or stiffness, at twice the mean speed or at an end of the speeds
 _MOST_LOST = 0.9  # of it, at either end of the speeds
-_MOST_GAINED = 9.0  # of it: by as large a factor as most may be lost by
 _OF = {"springs": ("suspension_stiffness_n_per_m", "travel_m", "BODY_AND_WHEEL"),
        "tires": ("tire_stiffness_n_per_m", "deflection_m", "WHEEL_AND_GROUND")}
 _DAMPERS = "dampers whose damping changes with the driving speed"
@@ -73,7 +72,7 @@ class ChangingWithSpeed(Family):
         """Dampers that have what the file says at a speed that nobody knows."""
         slowest, _, fastest = speeds_mps
         shares = tuple(
-            Parameter(name, _TRIED, -_MOST_LOST, _MOST_GAINED, 0.0, Scale.LINEAR, (_TRIED,),
+            Parameter(name, _TRIED, -_MOST_LOST, 9.0, 0.0, Scale.LINEAR, (_TRIED,),
                       f"share by which the damping is larger at {there:g} m/s than the vehicle's file says", step=0.02)
             for name, there in (("slowest_ratio", slowest), ("fastest_ratio", fastest)))
         return self._draft(_DAMPERS, "dampers at both ends", shares, _DAMPING.format(slowest=slowest, fastest=fastest),

@@ -28,7 +28,6 @@ def laws(self, p, laws):
         damping_n_s_per_m=laws.damping_n_s_per_m, lost_per_j=lost_per_j, cooling_time_s=p.cooling_time_s)
     return laws.with_law(Between.BODY_AND_WHEEL, force, own, rates, memory=(0.0,))
 """
-_LOSSES = (3e-5, 3e-4, 3e-3)
 
 
 class DamperHeat(Family):
@@ -40,12 +39,12 @@ class DamperHeat(Family):
     shown_by = "drive a rough road for some minutes without a pause, and again after one"
 
     def drafts(self, context: LawContext) -> list[Draft]:
-        alike = self._draft("alike", {"lost_per_j": "a damper's force"}, _LOSSES, "p.lost_per_j")
+        alike = self._draft("alike", {"lost_per_j": "a damper's force"}, (3e-5, 3e-4, 3e-3), "p.lost_per_j")
         if not context.axles:
             return [alike]
         # Dampers of two sizes grow hot by different energies.
         return [alike, self._draft(
-            "by_axle", {f"{axle}_lost_per_j": f"the force of a {axle} damper" for axle in context.axles}, _LOSSES[:1],
+            "by_axle", {f"{axle}_lost_per_j": f"the force of a {axle} damper" for axle in context.axles}, (3e-5,),
             "p.rear_lost_per_j if laws.rear else p.front_lost_per_j")]
 
     def _draft(self, variant: str, losses: Mapping[str, str], trials: tuple[float, ...], lost: str) -> Draft:

@@ -5,8 +5,6 @@ from __future__ import annotations
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
-_SHARE = 0.3  # of the damper's own force
-
 
 class DampingByTravel(Family):
     title = "a damping that goes with the travel of the suspensions"
@@ -18,7 +16,7 @@ class DampingByTravel(Family):
 
     def drafts(self, context: LawContext) -> list[Draft]:
         travel_m, rate_mps = context.reach("travel_m", 0.95), context.reach("rate_mps", 0.95)
-        size_n = rounded(_SHARE * context.vehicle.front.suspension_damping_n_s_per_m * rate_mps)
+        size_n = rounded(0.3 * context.vehicle.front.suspension_damping_n_s_per_m * rate_mps)
         functions = f"""
 def force_n(p, travel_m, rate_mps):
     way = np.minimum(np.abs(travel_m), {rounded(2 * context.reach('travel_m', 0.9999))!r}) / {travel_m!r}

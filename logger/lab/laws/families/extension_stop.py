@@ -9,9 +9,6 @@ from __future__ import annotations
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
-_STIFFER = 3.0  # than the suspension's own spring: what is tried
-_SHARES = (0.8, 0.93, 0.98)  # of the time, within which a suspension stays clear of the stop: tried
-
 _FUNCTIONS = """
 def force(p, seen):
     beyond_m = seen.travel_m - p.clearance_m
@@ -30,8 +27,8 @@ class ExtensionStop(Family):
     shown_by = "drive over a crest or a wide hole so fast that the wheels hang"
 
     def drafts(self, context: LawContext) -> list[Draft]:
-        stiffness = rounded(_STIFFER * context.vehicle.front.suspension_stiffness_n_per_m)
-        clear_m = tuple(sorted({context.reach("travel_m", share) for share in _SHARES}))
+        stiffness = rounded(3.0 * context.vehicle.front.suspension_stiffness_n_per_m)
+        clear_m = tuple(sorted({context.reach("travel_m", share) for share in (0.8, 0.93, 0.98)}))  # of the time
         parameters = (
             Parameter("stiffness_n_per_m", stiffness, 0.0, 100 * stiffness, 0.0, Scale.LINEAR, (stiffness,),
                       "of the stop"),

@@ -6,7 +6,6 @@ A power of the rate, or a smooth curve through points, which may differ in bump 
 from __future__ import annotations
 
 from logger.lab.laws.curves import RATE, CurveFamily
-from logger.lab.laws.draft import LawContext
 
 
 class ForceByRate(CurveFamily):
@@ -15,15 +14,13 @@ class ForceByRate(CurveFamily):
     shown_by = "drive the same road slowly and fast, or a smooth and a rough one"
     motion = RATE
     force = "damper force"
+    answers, tried = "suspension_damping_n_s_per_m", 1.0
     source = ("oil that is pressed through holes resists with the square of its speed, valves with less than its first "
               "power (J. C. Dixon, The Shock Absorber Handbook, 2007, chapter 6)")
     signature = "the damping changes as the road gets rougher"
     usual_share, reach_share = 0.95, 0.9995
     powers, power_ends = (0.4, 2.0, 3.0), (0.1, 5.0)
     ends = ((-1, "at the fastest"),)
-
-    def usual_force_n(self, context: LawContext, usual: float) -> float:
-        return context.vehicle.front.suspension_damping_n_s_per_m * usual
 
 
 FAMILY = ForceByRate()

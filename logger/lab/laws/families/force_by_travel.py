@@ -6,9 +6,6 @@ A power of the travel, or a smooth curve through points, which may differ in com
 from __future__ import annotations
 
 from logger.lab.laws.curves import TRAVEL, CurveFamily
-from logger.lab.laws.draft import LawContext
-
-_SHARE = 0.3  # of the spring's own force
 
 
 class ForceByTravel(CurveFamily):
@@ -17,12 +14,10 @@ class ForceByTravel(CurveFamily):
     shown_by = "drive a rough road, or over obstacles, so that the suspension travels far"
     motion = TRAVEL
     force = "spring force"
+    answers = "suspension_stiffness_n_per_m"
     source = "J. Reimpell, H. Stoll, J. W. Betzler, The Automotive Chassis (2001), chapter 5: springs, stops"
     signature = "large motions meet another spring than small ones"
     ends = ((0, "in deep compression"), (-1, "in extension"))
-
-    def usual_force_n(self, context: LawContext, usual: float) -> float:
-        return _SHARE * context.vehicle.front.suspension_stiffness_n_per_m * usual
 
 
 FAMILY = ForceByTravel()

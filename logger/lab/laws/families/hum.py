@@ -14,6 +14,7 @@ import numpy as np
 
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
 from logger.lab.laws.repeating import ALL_ALIKE, BEGINS, EACH, each_run, in_run, of_run, spatial_frequency, tone_in_time
+from logger.lab.likelihood.whittle import HIGHEST_OF_RATE
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _METHOD = """def record(self, p, recording):
@@ -26,9 +27,6 @@ _WANDERS = """p.frequency_hz * (
         recording.time_s + p.early_cos_s * np.cos(2 * np.pi * recording.time_s / p.period_s)
         + p.early_sin_s * np.sin(2 * np.pi * recording.time_s / p.period_s))"""
 _BY_WAY = "p.cycles_per_m * recording.distance_m"
-_LOWEST_HZ = 2.0
-_PER_M = (0.3, 5.0)
-_MOST_MPS2 = 100.0
 # Slopes are taken over so small a part of a cycle in a minute.
 _STEP, _STEP_S = 1e-5, 1e-4
 
@@ -41,7 +39,7 @@ class Hum(Family):
     stands_out = True
 
     def drafts(self, context: LawContext) -> list[Draft]:
-        hz = (_LOWEST_HZ, 0.37 * context.runs[0].rate_hz)
+        hz = (2.0, HIGHEST_OF_RATE * context.runs[0].rate_hz)
         drafts = []
         for wanders in (False, True):
             tone = tone_in_time(context, hz, wanders)
@@ -58,7 +56,7 @@ class Hum(Family):
             cycles, variant = (_WANDERS, "wanders") if wanders else (_STEADY, "steady")
             drafts += self._drafts(context, numbers, cycles, variant,
                                    "a tone that is there whatever the speed and the road")
-        per_m = spatial_frequency(context, _PER_M) if context.is_driven else None
+        per_m = spatial_frequency(context, (0.3, 5.0)) if context.is_driven else None
         if per_m is not None:
             drafts += self._drafts(context, [_shape("cycles_per_m", per_m, "cycles per metre of road", step=_STEP)],
                                    _BY_WAY, "by_way", "a tone whose frequency goes with the speed",
@@ -71,7 +69,7 @@ class Hum(Family):
         size = rounded(float(np.std(np.concatenate(context.residuals))))
 
         def draft(runs: Sequence[str], variant: str) -> Draft:
-            strengths = [Parameter(in_run(part, run, "mps2"), 0.1 * size, -_MOST_MPS2, _MOST_MPS2, 0.0, Scale.LINEAR,
+            strengths = [Parameter(in_run(part, run, "mps2"), 0.1 * size, -100.0, 100.0, 0.0, Scale.LINEAR,
                                    (0.1 * size,), f"{words} of the hum{of_run(run)}", step=0.02 * size)
                          for run in runs for part, words in (("cos", "even part"), ("sin", "odd part"))]
             pairs = ", ".join(f"(p.{in_run('cos', run, 'mps2')}, p.{in_run('sin', run, 'mps2')})" for run in runs)

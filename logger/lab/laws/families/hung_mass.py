@@ -9,8 +9,6 @@ from __future__ import annotations
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
-_SHARE, _MOST = 0.05, 1.0  # of the mass that carries it: tried, and what may be
-_BODY_HZ, _WHEEL_HZ = (1.5, 2.2, 3.2, 4.5, 7.0, 12.0), (5.0, 8.0, 12.0, 18.0)
 _ON_BODY = """
 def structure(self, p, structure):
     if p.mass_kg == 0:
@@ -42,22 +40,22 @@ class HungMass(Family):
     def drafts(self, context: LawContext) -> list[Draft]:
         car = context.vehicle
         wheel_kg = car.front.unsprung_mass_kg
-        at_wheels = self._draft("wheels", "a mass on a spring at each wheel", rounded(_SHARE * wheel_kg),
-                                rounded(_MOST * wheel_kg), "at each wheel", _WHEEL_HZ, (), _AT_WHEELS)
+        at_wheels = self._draft("wheels", "a mass on a spring at each wheel", wheel_kg, "at each wheel",
+                                (5.0, 8.0, 12.0, 18.0), (), _AT_WHEELS)
         if car.rear is None:
             return [at_wheels]  # a car that does not pitch has one place, and a mass there is on the list
         base_m = car.front.cg_distance_m + car.rear.cg_distance_m
         places = tuple(rounded(one) for one in (-car.rear.cg_distance_m - 0.3 * base_m, car.front.cg_distance_m))
         ahead = Parameter("ahead_m", places[0], rounded(-2 * base_m), rounded(2 * base_m), None, Scale.LINEAR, places,
                           "where it hangs, ahead of the centre of gravity", step=rounded(0.02 * base_m))
-        return [self._draft("body", "a mass on a spring on the body", rounded(_SHARE * car.sprung_mass_kg),
-                            rounded(_MOST * car.sprung_mass_kg), "in a half car on one side", _BODY_HZ, (ahead,),
-                            _ON_BODY), at_wheels]
+        return [self._draft("body", "a mass on a spring on the body", car.sprung_mass_kg, "in a half car on one side",
+                            (1.5, 2.2, 3.2, 4.5, 7.0, 12.0), (ahead,), _ON_BODY), at_wheels]
 
-    def _draft(self, variant: str, title: str, mass_kg: float, most_kg: float, where: str, trials_hz: tuple[float, ...],
+    def _draft(self, variant: str, title: str, carrier_kg: float, where: str, trials_hz: tuple[float, ...],
                more: tuple[Parameter, ...], method: str) -> Draft:
+        mass_kg = rounded(0.05 * carrier_kg)
         parameters = (
-            Parameter("mass_kg", mass_kg, 0.0, most_kg, 0.0, Scale.LINEAR, (mass_kg,), where),
+            Parameter("mass_kg", mass_kg, 0.0, rounded(carrier_kg), 0.0, Scale.LINEAR, (mass_kg,), where),
             Parameter("frequency_hz", trials_hz[len(trials_hz) // 2], 0.8, 30.0, None, Scale.LOG, trials_hz,
                       "of that mass on its spring"),
             Parameter("damping_ratio", 0.15, 0.005, 2.0, None, Scale.LOG, (0.15,), "of its spring"), *more)

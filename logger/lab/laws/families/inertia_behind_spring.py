@@ -13,10 +13,6 @@ from __future__ import annotations
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
-_SHARE = 0.5  # of the suspension's own stiffness, and of the mass of a wheel where there is no spring
-_HZ = (4.0, 8.0, 16.0, 32.0)  # octaves, up to the end of the band that is compared
-_RATIOS = (0.05, 0.2)  # an inerter's bearings hardly damp it, a mount's channel does
-
 _FUNCTIONS = """
 def force(p, seen):
     return p.stiffness_n_per_m * (seen.travel_m - seen.memory[0])
@@ -46,16 +42,18 @@ class InertiaBehindSpring(Family):
 
     def drafts(self, context: LawContext) -> list[Draft]:
         front = context.vehicle.front
-        stiffness = rounded(_SHARE * front.suspension_stiffness_n_per_m)
+        stiffness = rounded(0.5 * front.suspension_stiffness_n_per_m)
         # At 0.3 m/s the square takes as much as a damping ratio of 0.15 at 8 Hz.
         sprung = (
             Parameter("stiffness_n_per_m", stiffness, 0.0, 100 * stiffness, 0.0, Scale.LINEAR, (stiffness,),
                       "of the spring, where the inertia behind it stands still"),
-            Parameter("frequency_hz", 8.0, 1.0, 40.0, None, Scale.LOG, _HZ, "of the inertia on its spring"),
-            Parameter("damping_ratio", 0.2, 0.0, 3.0, None, Scale.LINEAR, _RATIOS, "of its motion", step=0.01),
+            Parameter("frequency_hz", 8.0, 1.0, 40.0, None, Scale.LOG, (4.0, 8.0, 16.0, 32.0),
+                      "of the inertia on its spring"),
+            # An inerter's bearings hardly damp it, a mount's channel does.
+            Parameter("damping_ratio", 0.2, 0.0, 3.0, None, Scale.LINEAR, (0.05, 0.2), "of its motion", step=0.01),
             Parameter("square_per_m", 50.0, 0.0, 30000.0, None, Scale.LINEAR, (50.0,),
                       "of what holds its motion back by the square of its speed, over its inertia", step=5.0))
-        wheel_kg = rounded(_SHARE * front.unsprung_mass_kg)
+        wheel_kg = rounded(0.5 * front.unsprung_mass_kg)
         inertance = Parameter("inertance_kg", wheel_kg, 0.0, 100 * wheel_kg, 0.0, Scale.LINEAR, (wheel_kg,),
                               "the mass that a suspension's ends feel against each other")
         return [self.draft((inertance,), _RIGID, kind="BodyEffect", variant="rigid",

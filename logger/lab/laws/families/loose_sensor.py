@@ -58,8 +58,6 @@ _METHOD = """def record(self, p, recording):
 """
 _WEAKEST, _TRIED, _CLOSER = 0.02, 200, np.linspace(-0.02, 0.02, 17)
 """Of the greatest fall of the body; how many are tried up to there, two hundredths apart; and around the best."""
-_STANDS_OUT = 10.0
-"""Standard errors of the skewness of white noise, sqrt(6 / n), and of its kurtosis, sqrt(24 / n)."""
 
 
 class LooseSensor(Family):
@@ -77,7 +75,7 @@ class LooseSensor(Family):
         shown = max(abs(skewness) / np.sqrt(6), kurtosis / np.sqrt(24)) * np.sqrt(len(size))
         predicted = [run.main(one) for run, one in zip(context.runs, context.state.predictions, strict=True)]
         greatest = max(float(-one.min()) for one in predicted)
-        if shown < _STANDS_OUT or not greatest > 0:
+        if shown < 10.0 or not greatest > 0:  # standard errors of white noise
             return []
         effect = self._draft(greatest, greatest).effect
         assert isinstance(effect, RecordEffect)

@@ -14,10 +14,6 @@ from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, round
 from logger.lab.laws.families.friction_with_memory import HANDED_ON
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
-_SHARE = 0.3  # of the forces of the part's own spring and damper
-_TRAVELS = (0.02, 0.2)  # shares of the usual travel, over which such parts yield
-_POWERS = (1.5, 6.0)
-
 _FUNCTIONS = """
 def force(p, seen):
     s = seen.memory[0]
@@ -46,15 +42,15 @@ class SlidingBehindSpring(Family):
         if vehicle.model != "component":
             return []
         front, travel_m, rate_mps = vehicle.front, context.reach("travel_m", 0.9), context.reach("rate_mps", 0.9)
-        size_n = rounded(_SHARE * (front.suspension_stiffness_n_per_m * travel_m
-                                   + front.suspension_damping_n_s_per_m * rate_mps))
-        lengths_m = tuple(rounded(one * travel_m) for one in _TRAVELS)
+        size_n = rounded(0.3 * (front.suspension_stiffness_n_per_m * travel_m
+                                + front.suspension_damping_n_s_per_m * rate_mps))
+        lengths_m = tuple(rounded(one * travel_m) for one in (0.02, 0.2))
         force, over, power, rate, ratio, play = (
             Parameter("sliding_force_n", size_n, 0.0, 1e4 * size_n, 0.0, Scale.LINEAR, (size_n,),
                       f"as it slides at {rate_mps:g} m/s, shortening"),
             Parameter("yield_travel_m", lengths_m[0], 1e-4 * lengths_m[0], 10 * travel_m, None, Scale.LOG, lengths_m,
                       "over which its spring comes to that force"),
-            Parameter("power_ratio", _POWERS[0], 0.3, 40.0, None, Scale.LOG, _POWERS,
+            Parameter("power_ratio", 1.5, 0.3, 40.0, None, Scale.LOG, (1.5, 6.0),
                       "exponent of the force in the rate of sliding"),
             Parameter("sliding_rate_m_per_s", rate_mps, rate_mps, rate_mps, None, Scale.LOG, (rate_mps,),
                       "at which what slides has its force", default=rate_mps),

@@ -7,8 +7,6 @@ from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, round
 from logger.lab.laws.families.friction_with_memory import HANDED_ON
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
-_SHARE = 0.5  # of the suspension's own stiffness
-
 _FUNCTIONS = """
 def force(p, seen):
     return p.stiffness_n_per_m * (seen.travel_m - seen.memory[0])
@@ -28,7 +26,7 @@ class SpringWithMemory(Family):
     shown_by = "drive the same road slowly and fast: quick motions meet a stiffer spring than slow ones"
 
     def drafts(self, context: LawContext) -> list[Draft]:
-        stiffness = rounded(_SHARE * context.vehicle.front.suspension_stiffness_n_per_m)
+        stiffness = rounded(0.5 * context.vehicle.front.suspension_stiffness_n_per_m)
         parameters = (
             Parameter("stiffness_n_per_m", stiffness, 0.0, 100 * stiffness, 0.0, Scale.LINEAR, (stiffness,),
                       "of the rubber where it has no time to creep"),

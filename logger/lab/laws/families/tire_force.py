@@ -7,9 +7,6 @@ let go.
 from __future__ import annotations
 
 from logger.lab.laws.curves import DEFLECTION, CurveFamily
-from logger.lab.laws.draft import LawContext
-
-_SHARE = 0.3  # of the tire's own force
 
 
 class TireForce(CurveFamily):
@@ -18,12 +15,10 @@ class TireForce(CurveFamily):
     shown_by = "drive a rough road, or over obstacles, fast, so that the tires are pressed far"
     motion = DEFLECTION
     force = "tire force"
+    answers = "tire_stiffness_n_per_m"
     source = "H. B. Pacejka, Tire and Vehicle Dynamics (2012), chapter 9: stiffness grows with the load"
     signature = "wheels hop at another frequency where the road is rough"
     ends = ((0, "where it is pressed most"), (-1, "where it is let go"))
-
-    def usual_force_n(self, context: LawContext, usual: float) -> float:
-        return _SHARE * context.vehicle.front.tire_stiffness_n_per_m * usual
 
 
 FAMILY = TireForce()

@@ -29,7 +29,6 @@ _METHOD = """def laws(self, p, laws):
 """
 _USUAL_KG_M = 0.02
 """A hundred grams on a rim of 0.2 m."""
-_MOST_KG_M = 2.0
 _RADII_M = (0.1, 0.5)
 
 
@@ -53,7 +52,7 @@ class WheelTurns(Family):
 
     def _draft(self, axles: Sequence[str], runs: Sequence[str], radius_m: float, variant: str) -> Draft:
         strengths = [
-            Parameter(_name(axle, part, run), _USUAL_KG_M, -_MOST_KG_M, _MOST_KG_M, 0.0,
+            Parameter(_name(axle, part, run), _USUAL_KG_M, -100 * _USUAL_KG_M, 100 * _USUAL_KG_M, 0.0,
                       Scale.LINEAR, (_USUAL_KG_M,),
                       f"mass times distance from the {axle or 'wheel'} axle, {words}{of_run(run)}",
                       step=0.1 * _USUAL_KG_M)
