@@ -28,6 +28,8 @@ RECEIVER_ERROR_LASTS_S = 60.0
 """Correlation time of the errors of a receiver's places (a judgement: the ionosphere's is longer, reflections'
 shorter)."""
 
+SLOWEST_MPS = 0.5
+"""A car that is slower stands: a length over its speed says nothing."""
 LATE_WITHIN_S = 0.3
 """How late the road is felt is looked for so far from window to window: above what receivers are late by, below half a
 bounce of a body."""

@@ -45,7 +45,7 @@ from logger.identification.unknown_inputs import (
 )
 from logger.profiles.track import Alterations, Stance, Track, Way, WheelTracks, along_paths
 from logger.roads.iso8608 import displacement_psd
-from logger.runs import READING, Run
+from logger.runs import EVEN_SAMPLES, READING, SLOWEST_MPS, Run
 from logger.simulation.virtual_drive import SimulatedRuns, steps_hz
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.effect import Chosen
@@ -61,7 +61,6 @@ _APPROACH_S = 3.0
 # How long the road behind a record takes to come back to where it began [s].
 _RETURN_S = 6.0
 _ROUND_THE_END = 1e-4
-_EVEN = 1e-3
 _KEPT_PLACES = 3  # of wheels: of differences by a scale of the speed, and where they are taken
 
 
@@ -74,7 +73,7 @@ class RoadInTime:
     def __init__(self, record: Run) -> None:
         rate_hz = record.rate_hz
         self._track = record.track
-        self._steps = int(np.ceil(FINE_RATE_HZ / rate_hz - _EVEN))
+        self._steps = int(np.ceil(FINE_RATE_HZ / rate_hz - EVEN_SAMPLES))
         fine_hz = rate_hz * self._steps
         lead, half = int(np.ceil(_APPROACH_S * rate_hz)), (len(recorder_taps(1)) - 1) // 2
         distance = record.distance_m
@@ -129,9 +128,8 @@ class RoadInTime:
         return (np.fft.rfft(back * self._fading)[:, : len(self.s)] * self._filter).T
 
 
-# Classes of speed that a record is described by, the slowest there is, and the longest period of a random road.
+# Classes of speed that a record is described by, and the longest period of a random road.
 _SPEEDS = 12
-_SLOWEST_MPS = 0.5
 _LONGEST_S = 100.0
 
 
@@ -240,7 +238,7 @@ class DriveModel:
         for run, record in enumerate(self.records):
             true_mps = record.speed_mps[record.first:] / self.road_with(values, run).speed_scale
             speed = np.quantile(true_mps, (np.arange(_SPEEDS) + 0.5) / _SPEEDS)[:, None]
-            speed = np.unique(np.maximum(speed, _SLOWEST_MPS), axis=0)
+            speed = np.unique(np.maximum(speed, SLOWEST_MPS), axis=0)
             f = np.maximum(f_hz, 1 / _LONGEST_S)
             power = np.abs(self.response(values, f, speed)) ** 2
             recorder = recorder_gain(f_hz / record.rate_hz) ** 2

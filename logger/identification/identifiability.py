@@ -61,6 +61,13 @@ class NotIdentifiable(CheckFailed):
         self.findings, self.error_before = list(findings), error_before
 
 
+def beside(start: Array, count: int, low: Array, high: Array) -> Array:
+    """A point (m,) near a start, its first ``count`` numbers a little off, where no symmetry hides a dependence."""
+    moved = start.copy()
+    moved[:count] += 0.03 * np.cos(1.0 + 2.0 * np.arange(count)) * (count > 1)
+    return np.clip(moved, low, high)
+
+
 def structural(names: Sequence[str], derivatives: Array, size: float, nothing: float) -> list[Finding]:
     """What no amount of such data could determine.
 

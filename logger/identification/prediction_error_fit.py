@@ -29,6 +29,7 @@ from logger.identification.identifiability import (
     NOTHING_EXACT,
     Finding,
     NotIdentifiable,
+    beside,
     statistical,
     structural,
     unexplained,
@@ -48,7 +49,6 @@ _LONGEST_STEP = 1.0
 # Converged: what is left of the way is this share of a standard error; of a model that is stepped through time, this.
 _CLOSE, _CLOSE_SIMULATED, _CLOSE_NOISE = 1e-5, 1e-2, 1e-4
 _MOST_STEPS, _MOST_NOISE_ROUNDS = 100, 20  # of one descent; of noise model and numbers in turn
-_NUDGE = 0.03
 _AT_BOUND = 1e-6
 _FAR = 3.0
 _ROOT_STEPS = 60
@@ -155,7 +155,8 @@ def fit(model: Predictor, measured: Sequence[Array], options: FitOptions | None 
     """
     problem = _FitProblem(model, measured, options or FitOptions())
     starts = problem.starts()
-    if findings := problem.structural_findings(problem.beside(starts[0])):
+    if findings := problem.structural_findings(
+            beside(starts[0], len(problem.free), problem.low, problem.high)):
         raise NotIdentifiable(findings)
     descents = [_descend(problem, start, problem.plain) for start in starts]
     best = descents[int(np.argmin([one.at.cost for one in descents]))]
@@ -283,11 +284,6 @@ class _FitProblem:
 
     def _behind(self, parts: Sequence[Array]) -> list[Array]:
         return [self.low_pass.apply(one) for one in parts]
-
-    def beside(self, start: Array) -> Array:
-        """A point near a start, where no symmetry of the start hides a dependence."""
-        nudge = _NUDGE * np.cos(1.0 + 2.0 * np.arange(len(start))) * (len(start) > 1)
-        return np.clip(start + nudge, self.low, self.high)
 
     def structural_findings(self, x: Array) -> list[Finding]:
         """What no such data could determine at a place."""

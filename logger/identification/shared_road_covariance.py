@@ -26,12 +26,12 @@ from logger.identification.noise_models import ROAD_LEVEL, PredictionWhitener
 from logger.identification.prediction_error_fit import Fit
 from logger.profiles.track import Track
 from logger.roads.iso8608 import displacement_psd
+from logger.runs import SLOWEST_MPS
 from logger.vehicle.named_parameters import Coordinates
 from logger.vehicle.simulate import recorder_gain
 
 _MOST_SAMPLES, _BEFORE_SAMPLES = 1500, 300
 _GRID_STEP_M, _GRID_SAMPLES = 0.02, 32_768
-_SLOWEST_MPS = 0.5
 _CERTAIN = 4.0  # standard deviations of what independent roads have in common by chance
 
 
@@ -108,7 +108,7 @@ def _drive(model: DriveModel, fit: Fit, values: Array, run: int, slopes: Array) 
     way_m = fit.low_pass.apply(record.distance_m[record.first:]) / road.speed_scale - start_m
     first = max(0, int(np.argmax(way_m >= 0)) - _BEFORE_SAMPLES) if road.obstacles else 0
     stretch = slice(first, first + _MOST_SAMPLES)
-    speed_mps = max(float(np.median(record.speed_mps[record.first:])) / road.speed_scale, _SLOWEST_MPS)
+    speed_mps = max(float(np.median(record.speed_mps[record.first:])) / road.speed_scale, SLOWEST_MPS)
     f_hz = np.maximum(_waves_cpm() * speed_mps, 1e-3)
     response = model.response(values, f_hz, speed_mps)
     gain = recorder_gain(f_hz / record.rate_hz) * fit.low_pass.gain(np.minimum(f_hz, record.rate_hz / 2))

@@ -26,11 +26,11 @@ from typing import Any
 import numpy as np
 
 from logger.arrays import Array
+from logger.profiles.track import SHORT_STEP_M
 from logger.vehicle.named_parameters import WEAKEST, Free
 
-# A shorter patch is taken for one of this length, and over a shorter step the mean is that of its ends [m].
+# A shorter patch is taken for one of this length [m].
 _LEAST_PATCH_M = 1e-3
-_SHORT_STEP_M = 1e-4
 # 38.1 mm of 4.4.5 and 150 mm by 2.60 m of 4.4.3 are usual; these are not.
 LARGEST_HEIGHT_M = 1.0
 LARGEST_WIDTH_M = 50.0
@@ -107,7 +107,7 @@ class ObstaclePath:
             at, area = ((front - rear) / (2 * half)
                         for front, rear in zip(one.integrals(x + half), one.integrals(x - half), strict=True))
             step = np.diff(x)
-            short = np.abs(step) < _SHORT_STEP_M
+            short = np.abs(step) < SHORT_STEP_M
             elevation[part] = at
             mean[part.start : part.stop - 1] = np.where(short, (at[1:] + at[:-1]) / 2,
                                                         np.diff(area) / np.where(short, 1, step))

@@ -26,10 +26,11 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.arrays import Array, Bools
+from logger.estimation.road_spectrum import PIVOT_CPM
 from logger.fitting.information_matrix import integrated_out
 from logger.fitting.levenberg_marquardt import minimise
 from logger.modal.mode import LARGEST_DAMPING_ERROR, LARGEST_FREQUENCY_ERROR, FoundMode, ModalResult, Rejected
-from logger.roads.iso8608 import HIGHEST_CPM
+from logger.roads.iso8608 import HIGHEST_CPM, STANDARD_WAVINESS
 from logger.vehicle.linear_car import AxleResponse
 from logger.vehicle.models import structure_of
 from logger.vehicle.modes import modes as modes_of
@@ -40,8 +41,8 @@ from logger.vehicle.vehicle import Vehicle
 
 _PIECE_S = 10.0
 _KERNEL = 6  # half bins to each side that a Hann taper mixes
-_USUAL_WAVINESS, _WAVINESS_SPREAD, _PIVOT_CPM = 2.0, 0.5, 0.2
-_SPREAD, _NOISE_SPREAD = 0.5, 3.0  # of logarithms; the noise starts at the quietest bin
+# The last two of logarithms; the noise starts at the quietest bin.
+_WAVINESS_SPREAD, _SPREAD, _NOISE_SPREAD = 0.5, 0.5, 3.0
 
 
 class UnlikeCar(ValueError):
@@ -113,7 +114,7 @@ class CarOnRoads:
         self._half_hz = pieces.step_hz / 2 * np.arange(2 * pieces.bins[0] - _KERNEL, 2 * pieces.bins[-1] + _KERNEL + 1)
         quietest = float(np.log(pieces.power.mean(axis=0).min()))
         self.names = [one.name for one in free_numbers]
-        self.start = np.array([*np.log([one.start for one in free_numbers]), _USUAL_WAVINESS, quietest])
+        self.start = np.array([*np.log([one.start for one in free_numbers]), STANDARD_WAVINESS, quietest])
         self.precision = np.array([*np.full(len(free_numbers), _SPREAD), _WAVINESS_SPREAD, _NOISE_SPREAD]) ** -2.0
 
     def shapes(self, x: Array) -> tuple[Array, Array]:
@@ -123,13 +124,13 @@ class CarOnRoads:
         waves = f_hz / self.pieces.speeds_mps[:, None]  # (c, h)
         late = np.exp(-2j * np.pi * waves[:, None] * self.car.behind_m[:, None])  # (c, x, h)
         whole = np.einsum("xh,cxh->ch", gains, late)
-        road = np.sinc(waves * self.car.contact_patch_m) ** 2 * (waves / _PIVOT_CPM) ** -waviness
+        road = np.sinc(waves * self.car.contact_patch_m) ** 2 * (waves / PIVOT_CPM) ** -waviness
         road = road / self.pieces.speeds_mps[:, None]
         spectra = np.empty((len(x), *whole.shape))
         spectra[0] = np.abs(whole) ** 2 * road
         for number, (value, one) in enumerate(zip(values, by_number, strict=True), 1):
             spectra[number] = 2 * value * (whole.conj() * np.einsum("xh,cxh->ch", one, late)).real * road
-        spectra[-1] = -spectra[0] * np.log(waves / _PIVOT_CPM)
+        spectra[-1] = -spectra[0] * np.log(waves / PIVOT_CPM)
         leaked = np.lib.stride_tricks.sliding_window_view(spectra, len(self.pieces.kernel), axis=-1)[..., ::2, :]
         mixed = self.pieces.shares @ (leaked @ self.pieces.kernel)
         return mixed[0], mixed[1:]

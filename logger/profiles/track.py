@@ -24,7 +24,7 @@ from logger.arrays import Array
 # A patch shorter than this is a point: averages over less would drown in rounding, and no profile is so fine.
 _POINT_M = 1e-4
 # The mean over a step shorter than this is that of its two ends, for the same reason.
-_SHORT_STEP_M = 1e-4
+SHORT_STEP_M = 1e-4
 # Knots nearer to each other than this share of a spacing are one.
 _SAME_KNOT = 1e-9
 _KEPT_PATHS = 3
@@ -232,7 +232,7 @@ class TirePath:
         elevation = height + along * (slope + along * (0.5 * bend))
         integral = integral + along * (height + along * (0.5 * slope + along * (bend / 6)))
         step = np.diff(distance_m)
-        short = np.abs(step) < _SHORT_STEP_M
+        short = np.abs(step) < SHORT_STEP_M
         mean = np.diff(integral) / np.where(short, 1.0, step)
         if short.any():
             mean[short] = 0.5 * (elevation[:-1] + elevation[1:])[short]

@@ -10,7 +10,15 @@ import numpy as np
 from logger.arrays import Array
 from logger.fitting.fisher_scoring import Maximum, maximise
 from logger.fitting.information_matrix import inverse
-from logger.identification.identifiability import APART, NOT_ONE_ROAD, Finding, NotIdentifiable, statistical, structural
+from logger.identification.identifiability import (
+    APART,
+    NOT_ONE_ROAD,
+    Finding,
+    NotIdentifiable,
+    beside,
+    statistical,
+    structural,
+)
 from logger.identification.unknown_road.marginal_likelihood import (
     GD_N0,
     HUNDREDTH,
@@ -34,7 +42,6 @@ _NOTHING = 1e-4
 _OFFSET_WEAKEST_M, _SCALE_WEAKEST = 0.5, 1.0
 # Drives over one road leave no more together than each alone, but for so many times, and this share of the readings.
 _MORE_TOGETHER, _LITTLE = 1.5, 0.05
-_NUDGE = 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,13 +107,6 @@ class RoadProblem:
                 if self.options.scale_off:
                     numbers[scaled[number]] = (scale - 1) / HUNDREDTH
         return np.append(self.coordinates.of(values), numbers)
-
-    def shifted(self, x: Array) -> Array:
-        """A place a little shifted a start, where no symmetry of the start hides anything."""
-        nudge = np.zeros_like(x)
-        p = len(self.free)
-        nudge[:p] = _NUDGE * np.cos(1.0 + 2.0 * np.arange(p)) * (p > 1)
-        return np.clip(x + nudge, self.low, self.high)
 
     def score(self, x: Array, information: bool) -> RoadsScore:
         """Slopes by the coordinates and, if asked for, the information."""
@@ -194,7 +194,8 @@ def fit_roads(car: ResponseCar, roads: Sequence[Sequence[RoadDrive]], options: O
     options = options or Options()
     problem = RoadProblem(car, roads, options)
     x = problem.start()
-    findings = problem.structural(problem.score(problem.shifted(x), information=True).information)
+    near = beside(x, len(problem.free), problem.low, problem.high)
+    findings = problem.structural(problem.score(near, information=True).information)
     if findings and options.refuse:
         raise NotIdentifiable(findings)
     before = problem.score(x, information=False).error

@@ -22,9 +22,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from logger.arrays import Array
-from logger.lab.likelihood.lag import SLOWEST_MPS
 from logger.lab.likelihood.priors import CONFLICT_SIGMA, UNUSUAL_SIGMA, Tolerance
-from logger.runs import RECEIVER_ERROR_LASTS_S, SENSOR, Run
+from logger.runs import RECEIVER_ERROR_LASTS_S, SENSOR, SLOWEST_MPS, Run
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.arrays import Array
-from logger.runs import LATE_WITHIN_S, Run
+from logger.runs import LATE_WITHIN_S, SLOWEST_MPS, Run
 
 WINDOW_S = 2.56
 """Length of a window: 256 samples at 100 Hz, a quick transform, two to four bounces of a body."""
@@ -23,8 +23,6 @@ _LEAST_FREEDOM = 5
 """No slope is estimated with fewer degrees of freedom: Student's t at 5 % is above 2.6 there. A judgement."""
 RESOLVED_M = 0.1
 """A fifth of the shortest wave that is felt: places that are known better need no search."""
-SLOWEST_MPS = 0.5
-"""A car that is slower stands: a length over its speed says nothing."""
 
 
 @dataclass(frozen=True, eq=False)
