@@ -12,7 +12,6 @@ import numpy as np
 from logger.arrays import Array, Complex
 from logger.dsp.filters import kaiser_half_length, low_pass_taps
 from logger.profiles.track import Way, WheelTracks
-from logger.runs import EVEN_SAMPLES
 from logger.vehicle.structure import Forces, Structure, pushed
 
 FINE_RATE_HZ = 1000.0
@@ -23,6 +22,7 @@ STOP_DB = 80.0
 _HALF_SAMPLES = ceil(kaiser_half_length(STOP_DB, 2 * np.pi * (STOP_OF_RATE - PASS_OF_RATE)))
 # The recorder's gain is read off a transform of so many points of its filter at so many times its rate.
 _GAIN_STEPS, _GAIN_GRID = 4, 16384
+_EVEN = 1e-3
 
 
 def recorder_taps(steps: int) -> Array:
@@ -99,7 +99,7 @@ class Passage:
             raise ValueError("expected two or more finite distances")
         self.track, self.rate_hz, self.distance_m = track, rate_hz, distance_m
         self.count = len(distance_m)
-        self.steps = max(1, int(np.ceil(fine_hz / rate_hz - EVEN_SAMPLES)))
+        self.steps = max(1, int(np.ceil(fine_hz / rate_hz - _EVEN)))
         self.step_s = 1 / (rate_hz * self.steps)
         self._lead = min(round(APPROACH_S * rate_hz), self.count) if is_free else round(APPROACH_S * rate_hz)
         self._mirrored = self._lead if is_free else 0
