@@ -50,12 +50,17 @@ def pooled(levels: Iterable[tuple[float, float]], power: float, freedom: float, 
 
 @dataclass(frozen=True, eq=False)
 class Denoised:
-    """Samples (n,) without their white noise, its standard deviation, 0 where they show none, and noise (n,) like what
-    is still in them."""
+    """Samples (n,) without their white noise, its standard deviation, 0 where they show none, and the shares (n,) of
+    their amplitudes that were kept, by frequency."""
 
     samples: Array
     deviation: float
-    left: Array
+    gain: Array
+
+    def left(self, draw: int) -> Array:
+        """Noise (n,) like what is still in the samples, one draw of it by its number."""
+        drawn = _spectrum(np.random.default_rng(draw).normal(0.0, self.deviation, len(self.samples)))
+        return _odd_samples(drawn * np.sqrt(self.gain))
 
 
 def without_white_noise(samples: Array) -> Denoised:
@@ -76,12 +81,14 @@ def without_white_noise(samples: Array) -> Denoised:
     width = 2 * _NEAR + 1
     local = np.convolve(np.pad(power, _NEAR, mode="reflect"), np.full(width, 1 / width), mode="valid")
     gain = np.where(local > noise * (1 + _ABOVE_SIGMA * np.sqrt(2 / width)), 1 - noise / np.maximum(local, noise), 0.0)
-    deviation = float(np.sqrt(noise))
-    drawn = _spectrum(np.random.default_rng(1).normal(0.0, deviation, count))
-    kept, left = (np.fft.irfft(one, 2 * (count - 1))[:count] for one in (spectrum * gain, drawn * np.sqrt(gain)))
-    return Denoised(line + kept, deviation, left)
+    return Denoised(line + _odd_samples(spectrum * gain), float(np.sqrt(noise)), gain)
 
 
 def _spectrum(samples: Array) -> Complex:
     """Spectrum (n,) of samples that go on oddly at both ends."""
     return np.fft.rfft(np.concatenate([samples, -samples[-2:0:-1]]))
+
+
+def _odd_samples(spectrum: npt.NDArray[np.complex128]) -> Array:
+    """Samples (n,) of such a spectrum."""
+    return np.fft.irfft(spectrum, 2 * (len(spectrum) - 1))[: len(spectrum)]

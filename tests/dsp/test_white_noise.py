@@ -27,7 +27,7 @@ def test_noise_of_a_sensor_is_found_and_taken_out() -> None:
     noise = 2e-5 * np.random.default_rng(1).standard_normal(len(place_m))
     found = without_white_noise(place_m + noise)
     assert found.deviation == pytest.approx(2e-5, rel=0.03)
-    assert np.std(found.left) == pytest.approx(np.std(found.samples - place_m), rel=0.3)
+    assert np.std(found.left(0)) == pytest.approx(np.std(found.samples - place_m), rel=0.3)
     assert np.std(found.samples - place_m) < 0.5 * 2e-5  # the motion's 12 of 250 Hz keep 5 % of its power
 
 

@@ -31,7 +31,7 @@ FOUND = AddedEffects(
               "friction_force_n": 3.9, "transition_velocity_m_per_s": float("inf")})),
     ("dry_friction",), (STILL, MASS, TIRE), error_before=0.47, error_refitted=0.43, error_after=0.153,
     error_as_written=0.154, noise_floor_error=0.15, p_value=1e-12, removed=AS_USUAL,
-    errors=NumberErrors({"sprung_mass_kg": 7.5}))
+    errors=NumberErrors({"sprung_mass_kg": 7.5}), excess=0.0)
 
 
 def test_the_errors_are_distinguished_from_the_file_as_it_was_to_the_noise() -> None:

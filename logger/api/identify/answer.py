@@ -53,6 +53,7 @@ from logger.identification.unknown_inputs import (
 from logger.identification.unknown_road.marginal_likelihood import GD_N0, NOISE, OFFSET, Options
 from logger.identification.unknown_road.marginal_likelihood import Options as RoadOptions
 from logger.identification.unknown_road.road_fit import RoadFit, fit_roads
+from logger.lab.likelihood.priors import UNUSUAL_SIGMA
 from logger.lab.readings_fit import ReadingsFit, fit_to_readings
 from logger.left_out import LeftOut, left_out_json, left_out_paragraph
 from logger.profiles.track import Track
@@ -505,6 +506,11 @@ def doubts(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
     if fit.at_bound:
         yield (f"{', '.join(fit.at_bound)} ended at a bound: the bound stopped the fit there; it is not a measured "
                "value.")
+    precision, pull = fit.prior
+    for name, off in zip(fit.parameters, np.abs(pull) / np.sqrt(np.maximum(precision, 1e-300)), strict=True):
+        if off > UNUSUAL_SIGMA:
+            yield (f"{name} came out {off:.1f} standard deviations from what the vehicle's file knows of it: either "
+                   "the file is wrong there, or the model lacks something that biases it.")
     if not white.passed:
         yield (f"residuals are not white (p = {white.p_value:.2g}): the noise model is incomplete, and the standard "
                "errors are a guide only.")

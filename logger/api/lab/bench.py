@@ -41,7 +41,6 @@ from logger.store.formats.effect_file import check_on, effect_named, own_effect
 from logger.store.formats.vehicle_file import CarModel, ModelStep
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, Effect, ForceEffect, SensorEffect, Sought, chosen
-from logger.vehicle.named_parameters import PRELOAD
 from logger.vehicle.uncertain import Known, Scales, sized
 from logger.vehicle.vehicle import OWN_NAMES
 
@@ -164,11 +163,15 @@ class Bench:
         best = max((refine(base.score, one) for one in said or tries), key=lambda one: one.gain)
         return chosen(effect, {**best.chosen.values, **values})
 
-    def added(self, start: Chosen, candidates: int, notify: Notify = silent) -> AddedEffects:
-        """The effect fitted with the car's numbers on all of the runs, from the best of so many ``candidates``."""
-        notify(f"fitting the model without and with {start.effect.name}")
+    def beside(self, starts: Sequence[Chosen]) -> Bench:
+        """The same with effects in the model that are about to be added."""
+        return replace(self, model=replace(self.model, effects=(*self.model.effects, *starts)))
+
+    def added(self, starts: Sequence[Chosen], candidates: int, notify: Notify = silent) -> AddedEffects:
+        """The effects fitted with the car's numbers on all of the runs, from the best of so many ``candidates``."""
+        notify(f"fitting the model without and with {' and '.join(one.effect.name for one in starts)}")
         with self.blamed():
-            return add(self.posterior(), self.model.effects, [self.filed(start)], candidates)
+            return add(self.posterior(), self.model.effects, list(map(self.filed, starts)), candidates)
 
     def model_with(self, found: AddedEffects) -> CarModel:
         """The model with what was added, and how it came to it. BadInput for one that could not be read back, because a
@@ -234,11 +237,10 @@ def tolerance_of(said: float | str | None, known: Mapping[str, Known] = MappingP
     no car's numbers have."""
     if said == UNKNOWN:
         return Tolerance().widened()
-    by_name = {name: one.deviation for name, one in known.items() if name != PRELOAD}
     if said is None:
-        return Tolerance(by_name=by_name)
+        return Tolerance.of(known)
     TOLERANCE.check("tolerance", float(said))
-    return Tolerance(numbers=float(said) / Tolerance.band, by_name=by_name)
+    return replace(Tolerance.of(known), numbers=float(said) / Tolerance.band)
 
 
 def _scales(word: str, model: CarModel, runs: SimulatedRuns) -> Scales | None:

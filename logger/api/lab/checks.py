@@ -116,11 +116,11 @@ def check_moves(word: str, model: CarModel, runs: SimulatedRuns) -> list[Array]:
 
 
 def check_roads(word: str, model: CarModel, runs: SimulatedRuns, warn: Callable[[str], None], anyway: bool) -> None:
-    """Raise BadInput where a run was driven over another road than that of its profile, as ``check_model``: all that
-    can be asked where the vehicle's numbers may be far off."""
-    car = compose(model.vehicle, model.effects)
-    followed = _followed(runs, predicted(word, model, runs, model.effects), car)
-    _say(_other_roads(runs, followed, car), warn, anyway)
+    """Raise BadInput where a run was driven over another road than that of its profile, or a rig's is in another unit,
+    as ``check_model``: all that can be asked where the vehicle's numbers may be far off."""
+    car, predictions = compose(model.vehicle, model.effects), predicted(word, model, runs, model.effects)
+    _say(chain(_other_units_on_rig(model, runs, predictions, Tolerance.of(model.known).widened()),
+               _other_roads(runs, _followed(runs, predictions, car), car)), warn, anyway)
 
 
 def predicted(word: str, model: CarModel, runs: SimulatedRuns, effects: Sequence[Chosen]) -> list[Array]:

@@ -22,6 +22,7 @@ from logger.chart_data import Array, Chart, Curves, Line, line
 from logger.identification.noise_models import rms
 from logger.lab.another_car import POOR_ERROR
 from logger.lab.compare import LabComparison, Standing
+from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.residual_tests.tests import ResidualTestResult
 from logger.lab.residuals.breakdown import ModelResiduals, Part, frequencies, segments
 from logger.lab.residuals.force_state_map import Curve, ForceMap
@@ -34,7 +35,7 @@ from logger.report.charts import chart
 from logger.report.quantities import chance, columns, finite, known, numbers_of, signal_errors, unit_of, wrapped
 from logger.runs import Run, are_on_rig, normalised_rms_error, runs_left_out, short_names
 from logger.store.formats import vehicle_file
-from logger.vehicle.effect import Effect
+from logger.vehicle.effect import Chosen, Effect
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -137,13 +138,14 @@ class AddedEffect(CommandResult):
 
 def added(question: AddEffectQuestion) -> AddedEffect:
     """The answer to ``AddEffectQuestion``, which says what is raised."""
-    bench = bench_with(question)
-    effect, file, values = asked_for(str(question.name), bench, question)
-    values |= dict(question.start or {})
-    bench = bench.with_effect(effect, file)
-    is_given = set(values) >= {one.name for one in effect.parameters}
-    found = bench.added(bench.search_values(effect, values, question.progress),
-                        1 if is_given else len(effect.trials()), question.progress)
+    bench, starts, candidates = bench_with(question), list[Chosen](), 1
+    for name in question.names:
+        effect, file, values = asked_for(name, bench, question)
+        values |= dict(question.start or {})
+        bench = bench.with_effect(effect, file)
+        candidates *= 1 if set(values) >= {one.name for one in effect.parameters} else len(effect.trials())
+        starts.append(bench.beside(starts).search_values(effect, values, question.progress))
+    found = bench.added(starts, candidates, question.progress)
     return addition_of(found, model_of(bench.model_with(found)))
 
 
@@ -594,6 +596,10 @@ def judgement(found: AddedEffects) -> list[str]:
     lines += [f"{one.effect.name}: {numbers_of(one) or one.effect.title}." for one in found.new]
     lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
                            "{} refitted without it, {} with it, noise floor about {}")
+    if found.excess > UNEXPLAINED:
+        lines.append(f"Something more is missing: in the worst run the residual is {1 + found.excess:.3g} times the "
+                     "sensor's noise. The numbers are biased by that, maybe by more than their standard errors; add "
+                     "what ridelog diagnose finds together.")
     for one in found.new:
         at = [parameter.name for parameter in one.effect.parameters if parameter.is_free
               and min(abs(one.values[parameter.name] - end) for end in (parameter.low, parameter.high)

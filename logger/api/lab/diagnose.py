@@ -166,12 +166,9 @@ def _compared(bench: Bench) -> str:
 
 def _next(question: DiagnoseQuestion, bench: Bench, found: LabDiagnosis) -> str:
     if found.missing:
-        one, *others = (one.effect.name for one in found.missing)
-        command = question.command(f"add-effect {bench.files.get(one, one)} {{}} --out with-{one}.yaml")
-        if not others:
-            return f"Next: {command}"
-        return wrapped([f"Next: add {enumerated([one, *others], 'and')} one after the other. Until all are in the "
-                        "file, those still missing bias each fit."]) + f"\n{command}"
+        names = [one.effect.name for one in found.missing]
+        asked = "+".join(bench.files.get(one, one) for one in names)
+        return "Next: " + question.command(f"add-effect {asked} {{}} --out with-{'-'.join(names)}.yaml")
     if found.beyond and not found.exceeds_noise:
         words = (f"Next: check {', '.join(found.beyond)} in the vehicle's file. This command fits them to the runs "
                  "alone:")

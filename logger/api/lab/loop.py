@@ -229,7 +229,7 @@ class _Step:
         self.notify(chapter(f"Add {name}", self.explain("add", name, str(file))))
         begin = start or _searched(self.given, name, self.progress)
         with self.progress() as notify:
-            addition = self.given.added(begin, len(begin.effect.trials()), notify)
+            addition = self.given.added([begin], len(begin.effect.trials()), notify)
         return self._with(addition, name, file)
 
     def learned(self) -> tuple[_Step, LawSearch, list[Round]]:

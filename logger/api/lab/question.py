@@ -1,5 +1,6 @@
 """What the lab's verbs are asked: compare, diagnose, add-effect, learn, plan and lab."""
 
+import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
@@ -102,10 +103,12 @@ class AddEffectQuestion(LabQuestion):
     """Add a physical effect to a vehicle: fit it with the car's numbers on all of the runs, and show what that changed.
 
       ridelog add-effect dry_friction --vehicle mycar.yaml --out mycar-2.yaml run1 run2
+      ridelog add-effect dry_friction+damper_asymmetry --vehicle mycar.yaml --out mycar-2.yaml run1 run2
       ridelog add-effect sensor_bandwidth:order=2,cutoff_hz=20 --vehicle mycar.yaml --out mycar-2.yaml run1 run2
       ridelog add-effect ./my_effect.py --vehicle mycar.yaml --out mycar-2.yaml run1 run2
 
-    The fit begins at the parameters that you give (PARAM=VALUE) and searches for the others. The new vehicle file holds
+    Several effects are fitted together. The fit begins at the parameters that you give (PARAM=VALUE) and searches for
+    the others. The new vehicle file holds
     the effects with their standard errors, the car's refitted parameters and the history of the model. The old file
     stays as it is unless --out names it.
 
@@ -121,16 +124,21 @@ class AddEffectQuestion(LabQuestion):
 
     name: Annotated[Path | str, question.Argument(
         "an effect that comes with ridelog, or the path of the Python file of one of your own",
-        metavar="NAME[:PARAM=VALUE,...]", read=str)]
+        metavar="NAME[:PARAM=VALUE,...][+NAME...]", read=str)]
     vehicle: question.VehicleName
     runs: question.TrackedRuns
     _: KW_ONLY
     start: Annotated[Mapping[str, float] | None, "numbers of the effect by name, where its fit begins"] = None
 
+    @property
+    def names(self) -> list[str]:
+        """Of the effects, as they were asked for one by one: those of files may have a plus in them."""
+        return [str(self.name)] if Path(self.name).is_file() else re.split(r"[+](?=[^\d.]|\.{0,2}/)", str(self.name))
+
     def files_read(self) -> Sequence[Path]:
-        own = Path(str(self.name).partition(":")[0])
+        own = [Path(one.partition(":")[0]) for one in self.names]
         read = [one for one in super().files_read() if one not in question.files_of(self.vehicle)[:1]]
-        return [*read, *([own] if own.is_file() else [])]
+        return [*read, *(one for one in own if one.is_file())]
 
 
 @dataclass(frozen=True)

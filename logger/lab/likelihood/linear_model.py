@@ -263,6 +263,14 @@ class LinearModel:
             squares += float(white @ white + here @ precision @ here - owed @ step)
         return RecordErrorFit(found, squares, whites, steps, self._records)
 
+    def without_record_errors(self, columns: Sequence[Array]) -> list[Array]:
+        """Derivatives (m, n) per run less what the record's errors absorb of them, as far as the readings show."""
+        from scipy.linalg import cho_solve
+
+        seen = self.without_insensitive_samples(columns)
+        return [one - (record.slopes.T @ cho_solve((root, True), record.projected(whitener(one)))).T
+                for one, record, root, whitener in zip(seen, self._records, self._roots, self.whiteners, strict=True)]
+
     def objective(self, predictions: Sequence[Array], logs: Array) -> float:
         """Sum of squares of the whitened residuals and cost of the priors, with the most likely record errors."""
         return self.fit_record_errors(predictions).squares + self.prior.cost(logs)

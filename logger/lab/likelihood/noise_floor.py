@@ -168,7 +168,7 @@ def excess_by_signal(posterior: Posterior, state: State, chance: float, noise: N
     from scipy.special import gammainccinv
 
     signals = _by_signal(posterior, state)
-    carried = by_signal(posterior.readings, posterior.bands, posterior.carried_noise(state))
+    carried = by_signal(posterior.readings, posterior.bands, posterior.carried_noise(state, 0))
     count, found = sum(len(one.bands) for one in signals), dict[str, float]()
     for signal, inputs in zip(signals, carried, strict=True):
         own = noise or _noise_of(signal)

@@ -154,11 +154,11 @@ class Posterior:
         """Readings minus predictions (n,), per run."""
         return [one.residual(prediction) for one, prediction in zip(self.readings, predictions, strict=True)]
 
-    def carried_noise(self, state: State) -> list[Array]:
+    def carried_noise(self, state: State, draw: int) -> list[Array]:
         """Changes (n,) of the predictions, per run, by noise like what is still in the measured input of a rig, signals
-        joined: what the model makes of it in each."""
+        joined: what the model makes of it in each. One draw of the noise by its number."""
         tracks = [one.track for one in self.runs.runs]
-        noisy = [(isinstance(one, Excitation) and one.with_noise_left) or one for one in tracks]
+        noisy = [one.with_noise_left(draw) if isinstance(one, Excitation) and one.is_noisy else one for one in tracks]
         if all(one is other for one, other in zip(noisy, tracks, strict=True)):
             return [np.zeros_like(one) for one in state.predictions]
         car, error_m = self.car(state.effects, state.logs), self.distance_error_m(state.record)

@@ -15,7 +15,7 @@ import numpy as np
 
 from logger.arrays import Array, Bools
 from logger.runs import ENCODER, SENSOR, Signal
-from logger.vehicle.named_parameters import WEAKEST, changed, read, sized
+from logger.vehicle.named_parameters import PRELOAD, WEAKEST, changed, read, sized
 from logger.vehicle.uncertain import Known, grows_with_mass
 from logger.vehicle.vehicle import Vehicle
 
@@ -50,6 +50,11 @@ class Tolerance:
     droop: float = 0.4
     band: float = 1.6
     by_name: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, known: Mapping[str, Known]) -> Tolerance:
+        """The usual ones, but for numbers of which the vehicle's file says how well they are known."""
+        return cls(by_name={name: one.deviation for name, one in known.items() if name != PRELOAD})
 
     @property
     def largest(self) -> float:

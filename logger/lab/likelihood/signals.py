@@ -53,6 +53,11 @@ class JointBands:
     def whitener(self, residual: Array) -> JointWhitener:
         return JointWhitener([one.whitener(part) for one, part in zip(self.each, self.parts(residual), strict=True)])
 
+    def scatter_whitener(self, residual: Array, carried: Array) -> JointWhitener:
+        ends = np.cumsum([len(one.freedom) for one in self.each])[:-1]
+        return JointWhitener([one.scatter_whitener(part, own) for one, part, own in zip(
+            self.each, self.parts(residual), np.split(carried, ends), strict=True)])
+
     def flat_whitener(self, samples: Array) -> JointWhitener:
         return JointWhitener([one.flat_whitener(part) for one, part in zip(
             self.each, self.parts(samples), strict=True)])

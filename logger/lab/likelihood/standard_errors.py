@@ -1,5 +1,10 @@
 """Standard errors of the numbers of a fitted model, from the information matrix.
 
+On a rig squares are weighed by one level, and the noise of its measured input goes through the model: friction and
+stops make more of it than of all other noise, and the fit follows it. There the covariance is that of the estimates
+themselves (H. White, Econometrica 50, 1982): of the gradient under the noise as it is, between two inverses of the
+information. The noise of the readings has the residual's power in each band; that of the input is drawn.
+
 The numbers of effects differ by many powers of ten (a cubic stiffness has 1e6, a ratio 1), so that the matrix is scaled
 to a diagonal of ones before it is inverted.
 """
@@ -14,11 +19,14 @@ import numpy as np
 from logger.arrays import Array
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import own_slopes, range_of, without_common_scale
+from logger.runs import are_on_rig
 from logger.vehicle.effect import Chosen
 from logger.vehicle.named_parameters import FreeParameter, coordinates_of, free_parameters_of, read, slope_of
 from logger.vehicle.uncertain import NumberErrors
 
 _SCALE = "sprung_mass_kg"
+_DRAWS = 18
+"""Of the input's noise: the standard error of a standard deviation by n draws is 1 / sqrt(2 n) of it, a sixth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,9 +104,27 @@ def _covariance(linear: LinearModel) -> Array:
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
     known = size > 0
     scale = np.where(known, size, 1.0)
-    inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-10, hermitian=True)
-    return np.asarray(np.where(np.outer(known, known), inverse / np.outer(scale, scale),
-                               np.diag(np.where(known, 0.0, np.inf))))
+    inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-10, hermitian=True) / np.outer(scale, scale)
+    if are_on_rig(linear.posterior.runs.runs):
+        inverse = inverse @ (information + _scatter(linear, slopes)) @ inverse
+    return np.asarray(np.where(np.outer(known, known), inverse, np.diag(np.where(known, 0.0, np.inf))))
+
+
+def _scatter(linear: LinearModel, slopes: list[Array] | None) -> Array:
+    """Covariance of the gradient of a rig's fit by the numbers of the car, and by those whose derivatives (m, n) per
+    run these are, less the information: (p + m, p + m)."""
+    posterior, state = linear.posterior, linear.state
+    parts = [one for one in (linear.numbers, slopes) if one is not None]
+    columns = linear.without_record_errors([np.vstack(one) for one in zip(*parts, strict=True)])
+    drawn = [posterior.carried_noise(state, draw) for draw in range(_DRAWS)]
+    found = np.zeros((len(columns[0]), len(columns[0])))
+    pulls = np.zeros((_DRAWS, len(found)))
+    for run, (bands, residual) in enumerate(zip(posterior.bands, posterior.residuals(state), strict=True)):
+        carried = np.mean([bands.power(one[run]) for one in drawn], axis=0)
+        own, white = bands.scatter_whitener(residual, carried)(columns[run]), linear.whiteners[run](columns[run])
+        pulls += np.stack([linear.whiteners[run](one[run]) for one in drawn]) @ white.T
+        found += own @ own.T - white @ white.T
+    return found + pulls.T @ pulls / _DRAWS
 
 
 def with_standard_errors(effects: Sequence[Chosen], free_parameters: Sequence[FreeParameter], deviations: Array

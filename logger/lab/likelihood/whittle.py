@@ -122,6 +122,13 @@ class Bands:
         """The whitening filter for the levels under a residual (n,)."""
         return Whitener(self, self.levels(residual))
 
+    def scatter_whitener(self, residual: Array, carried: Array) -> Whitener:
+        """A filter after which the products of columns are their scores' covariance: of fits that weigh samples by the
+        levels under a residual (n,), whose noise has its power in each band but for that (b,) which came in with the
+        measured input."""
+        noise = np.maximum(self.power(residual) - carried, self.floor)
+        return Whitener(self, self.levels(residual) ** 2 / noise)
+
     def flat_whitener(self, samples: Array) -> Whitener:
         """A filter that weighs all bands alike, in units of the r.m.s. of samples (n,) in them."""
         power = float(np.average(self.levels(samples), weights=self.freedom))

@@ -17,7 +17,13 @@ from logger.lab.likelihood.by_squares import BySquares
 from logger.lab.likelihood.distance_error import zero_of
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit_model, fit_to_the_end
-from logger.lab.likelihood.noise_floor import SignalErrors, floor_error, sensor_noise_with_rounding, signal_errors_of
+from logger.lab.likelihood.noise_floor import (
+    SignalErrors,
+    excess_over_noise,
+    floor_error,
+    sensor_noise_with_rounding,
+    signal_errors_of,
+)
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
@@ -77,6 +83,7 @@ class AddedEffects:
     band                           in which the runs were compared; None: all
     removed                        sensor drift, distance error and filtering, removed from the errors
     errors                         of the numbers of vehicle and effects together
+    excess                         share by which the residual is above the noise in the run where it is largest
     signals                        errors of other signals than the sensor's acceleration, without and with the effects
     tolerance                      share by which the car's masses, springs and dampers may well be off
     """
@@ -93,6 +100,7 @@ class AddedEffects:
     p_value: float
     removed: Removed
     errors: NumberErrors
+    excess: float
     signals: Mapping[str, SignalErrors] = field(default_factory=dict)
     held_out_gain: float = 0.0
     band: ComparedBand | None = None
@@ -172,6 +180,7 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
         error_as_written=posterior.error(posterior.state_at(state.effects, state.logs, exact)),
         noise_floor_error=floor_error(posterior, sensor_noise_with_rounding(posterior, state)),
         p_value=p_value, removed=removed_from(posterior, start.predictions, state), errors=errors.numbers,
+        excess=excess_over_noise(posterior, state, FALSE_ALARM),
         held_out_gain=unseen_before.deviance - unseen_after.deviance,
         band=compared_band(posterior.runs.runs), signals=signal_errors_of(posterior, before.state, state),
         tolerance=posterior.tolerance.share)
