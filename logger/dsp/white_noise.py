@@ -89,6 +89,6 @@ def _spectrum(samples: Array) -> Complex:
     return np.fft.rfft(np.concatenate([samples, -samples[-2:0:-1]]))
 
 
-def _odd_samples(spectrum: npt.NDArray[np.complex128]) -> Array:
+def _odd_samples(spectrum: Complex) -> Array:
     """Samples (n,) of such a spectrum."""
     return np.fft.irfft(spectrum, 2 * (len(spectrum) - 1))[: len(spectrum)]

@@ -289,7 +289,9 @@ def in_blocks(structure: Structure, passage: Passage, observe: Array) -> Array:
     inputs, mean = passage.under_wheels(structure)
     around = np.concatenate([2 * inputs[:1] - mean[:1], mean, 2 * inputs[-1:] - mean[-1:]])
     transition, gain = _linear_step(structure, passage.step_s)
-    return driven_outputs(transition, gain, observe, np.hstack([mean, (around[2:] - around[:-2]) / 4]),
+    driving = np.hstack([mean, (around[2:] - around[:-2]) / 4])
+    moves = driving.any(axis=0) & gain.any(axis=0)  # the base of a rig that a force drives is at rest
+    return driven_outputs(transition, gain[:, moves], observe, driving[:, moves],
                           structure.at_rest(inputs[0]) + passage.begins)
 
 

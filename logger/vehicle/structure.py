@@ -117,8 +117,8 @@ def driven_outputs(transition: Array, gain: Array, observe: Array, inputs: Array
     through = answers[(_STEPS - _STEPS[:, None] - 1) % (2 * _BLOCK)].transpose(0, 3, 1, 2)
     states = np.empty((blocks, n))
     states[0] = start
-    states[1:] = recursion(powers[-1], rows[:-1] @ to_end.reshape(-1, n), start)
-    result = states @ seen.reshape(n, -1) + rows @ through.reshape(_BLOCK * m, -1)
+    states[1:] = recursion(powers[-1], rows[:-1] @ to_end.reshape(_BLOCK * m, n), start)
+    result = states @ seen.reshape(n, -1) + rows @ through.reshape(_BLOCK * m, _BLOCK * p)
     return result.reshape(-1, p)[: count + 1]
 
 

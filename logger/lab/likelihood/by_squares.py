@@ -9,6 +9,7 @@ were the noise as large as all that was measured, a damper known to a factor of 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
@@ -24,18 +25,25 @@ from logger.vehicle.named_parameters import free_parameters_of
 
 
 class BySquares:
-    """Least squares over runs of which none repeats another, all bands weighed alike."""
+    """Least squares over some runs (``kept``) of a posterior, of which none repeats another, all bands weighed alike.
+    """
 
-    def __init__(self, posterior: Posterior) -> None:
-        runs, kept = posterior.runs.runs, list[int]()
-        for index, run in enumerate(runs):
-            if not any(repeat_each_other(runs[one], run) for one in kept):
-                kept.append(index)
+    def __init__(self, posterior: Posterior, kept: Sequence[int]) -> None:
+        runs = posterior.runs.runs
         self.kept, self.whole = kept, posterior
         self.posterior = posterior if len(kept) == len(runs) else Posterior(
             SimulatedRuns([runs[one] for one in kept], posterior.runs.fine_hz), posterior.vehicle, posterior.tolerance,
             posterior.start_vehicle, posterior.prior, [posterior.readings[one] for one in kept])
         self.whiteners = self._whiteners(1.0)
+
+    @classmethod
+    def of(cls, posterior: Posterior) -> BySquares:
+        """Those over the runs of a posterior."""
+        runs, kept = posterior.runs.runs, list[int]()
+        for index, run in enumerate(runs):
+            if not any(repeat_each_other(runs[one], run) for one in kept):
+                kept.append(index)
+        return cls(posterior, kept)
 
     def _whiteners(self, noise: float) -> list[JointWhitener]:
         """For a noise that is such a share of what was measured."""
@@ -62,6 +70,24 @@ class BySquares:
         except NotSimulated:
             return None
         return (deviance, state) if np.isfinite(deviance) else None
+
+    def rank(self, effects: Sequence[Chosen], logs: Array, near: State) -> float:
+        """The deviance of a car by the loudest run alone, simulated roughly: enough to tell which of many cars are
+        near. Arguments as of ``at``; infinite where it cannot be."""
+        posterior, index = self._loudest.posterior, self._loudest.kept[0]
+        record = near.record[index if len(near.record) == len(self.whole.runs) else self.kept.index(index)]
+        try:
+            with np.errstate(all="ignore"):
+                predictions = posterior.predict(effects, logs, [record], rough=True)
+                found = self._loudest.deviance(State(tuple(effects), logs, [record], near.size, predictions))
+        except NotSimulated:
+            return np.inf
+        return found if np.isfinite(found) else np.inf
+
+    @cached_property
+    def _loudest(self) -> BySquares:
+        loudest = max(self.kept, key=lambda one: float(self.whole.runs.runs[one].kept_mps2.std()))
+        return self if len(self.kept) == 1 else BySquares(self.whole, [loudest])
 
     def improved(self, start: State, rounds: int) -> tuple[float, State]:
         """A state improved in so many rounds of steps, and its deviance."""

@@ -206,7 +206,7 @@ def _best_trial(posterior: Posterior, near: State, nominal: tuple[Chosen, ...], 
     at, the best so many of them improved; None on roads."""
     if not are_on_rig(posterior.runs.runs):
         return None
-    by_squares, one = BySquares(posterior), nominal[-1]
+    by_squares, one = BySquares.of(posterior), nominal[-1]
     cars = (near.logs, posterior.prior.logs(posterior.vehicle, posterior.start_vehicle))
     begun = [by_squares.at((*nominal[:-1], chosen(one.effect, trial)), logs, near)
              for trial in one.effect.trials() for logs in cars]

@@ -115,7 +115,7 @@ def _rough_fit(score: float, base: Baseline, trial: Trial) -> CandidateFit | Non
 def _fit_by_squares(score: float, base: Baseline, start: State) -> CandidateFit:
     """A fit that the likelihood led astray, to where it is far worse than the model without the effect, fitted by
     squares first."""
-    by_squares = BySquares(base.posterior)
+    by_squares = BySquares.of(base.posterior)
     begun = by_squares.at(start.effects, start.logs, start)
     state = start if begun is None else by_squares.of_all(by_squares.improved(begun[1], 12)[1], start)
     return CandidateFit.of(score, fit(LinearModel(base.posterior, state), rounds=3))

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 from zlib import crc32
 
@@ -30,16 +31,27 @@ from logger.lab.selection.stepwise import MeasuredRoad, Progress
 from logger.vehicle.effect import Chosen, Effect, Misalignment, chosen
 from logger.vehicle.named_parameters import WEAKEST
 
+_Drawn = tuple[float, State]
+"""A car with its deviance by squares."""
+_NEAR = 0.1
+"""A model that leaves less than this of what was measured, on what no fit saw, has the numbers of the car about right:
+were they far off, its resonances would be, and leave more (a judgement)."""
+_ROUNDS = 3, 3, 6
+"""Rounds by which starts of all effects, of the best half of them and of the best quarter are improved, one after the
+other (sequential halving: Z. Karnin, T. Koren and O. Somekh, ICML 2013)."""
+
 
 @dataclass(frozen=True, eq=False)
 class Started(Screened):
     """An effect that was screened on a model and in cars that were drawn.
 
-    anchor           the model by squares, around which they were drawn
-    gain_by_squares  of the best of them over it, in minus twice the log of the likelihood under white noise
+    others           the best of these of each kind but the first, with their deviances
+    ends             the first of each kind, improved
+    gain_by_squares  of the best of them over the model, in minus twice the log of the likelihood under white noise
     """
 
-    anchor: State
+    others: Sequence[_Drawn]
+    ends: Sequence[_Drawn]
     gain_by_squares: float
 
     @property
@@ -74,37 +86,45 @@ class UnknownNumbers(MeasuredRoad):
                  pool: ThreadPoolExecutor, progress: Progress) -> list[Screened]:
         """Effects screened on the model, and by squares in cars that are drawn."""
         local = super().screened(base, effects, seen, near, pool, progress)
-        if base.explanation == 0:  # what is left is noise: this is the car
+        if base.explanation == 0 or base.hold_out.error < _NEAR:
             return local
         by_squares = self._by_squares(base.posterior)
         anchor = self._anchor(by_squares, base.state, 1)
         without = by_squares.deviance(anchor)
 
         def begun(one: Screened) -> Screened:
-            found = self._begun(by_squares, one.effect, anchor, 1)
-            if not found:
+            drawn = self._cars(by_squares, one.effect, anchor)
+            if not (ends := _improved(by_squares, [some[0] for some in drawn if some], _ROUNDS[0])):
                 return one
-            return Started(one.effect, one.trials, anchor, without - by_squares.deviance(found[0]))
+            return Started(one.effect, one.trials, [one for some in drawn for one in some[1:]], ends,
+                           without - ends[0][0])
 
-        return sorted(pool.map(begun, local), key=lambda one: -one.gain)
+        def farther(rounds: int, one: Screened) -> Screened:
+            if not isinstance(one, Started):
+                return one
+            ends = _improved(by_squares, one.ends, rounds)
+            return replace(one, ends=ends, gain_by_squares=without - ends[0][0])
+
+        found = sorted(pool.map(begun, local), key=_by_gain)
+        for halvings, rounds in enumerate(_ROUNDS[1:], 1):
+            best = len(found) >> halvings
+            found[:best] = sorted(pool.map(partial(farther, rounds), found[:best]), key=_by_gain)
+        return sorted(found, key=_by_gain)
 
     def stripped(self, now: Baseline, name: str) -> None:  # type: ignore[override]
         """It is the fitted one."""
 
     def fitted_roughly(self, score: float, base: Baseline, one: Screened, least: float) -> list[CandidateFit]:
         """Fits from the best trial on the model, and from the best of the cars that were drawn."""
-        found = fit_roughly(score, base, replace(one, trials=one.trials[:1]))
         if not isinstance(one, Started):
-            return found
+            return fit_roughly(score, base, one, least)
+        found = fit_roughly(score, base, replace(one, trials=one.trials[:1]))
         by_squares = self._by_squares(base.posterior)
-        ends = self._begun(by_squares, one.effect, one.anchor, self.starts)
-        if not ends:
-            return found
-        least = by_squares.deviance(ends[0])
-        self.ends[one.effect.name] = sum(
-            by_squares.deviance(end) < least + INDISTINGUISHABLE for end in ends), len(ends)
+        ends = sorted([*one.ends, *_improved(by_squares, one.others, sum(_ROUNDS))], key=_by_deviance)
+        least, best = ends[0]
+        self.ends[one.effect.name] = sum(deviance < least + INDISTINGUISHABLE for deviance, _ in ends), len(ends)
         found.append(CandidateFit.of(score, self._likeliest(
-            by_squares.of_all(ends[0], base.state), base.posterior)))
+            by_squares.of_all(best, base.state), base.posterior)))
         return sorted(found, key=lambda one: -one.gain)
 
     def without(self, now: Baseline, name: str) -> Baseline:
@@ -127,25 +147,24 @@ class UnknownNumbers(MeasuredRoad):
 
     def _by_squares(self, posterior: Posterior) -> BySquares:
         if id(posterior) not in self._squares:
-            self._squares[id(posterior)] = posterior, BySquares(posterior)  # kept, so that its id stays its own
+            self._squares[id(posterior)] = posterior, BySquares.of(posterior)  # kept, so that its id stays its own
         return self._squares[id(posterior)][1]
 
     def _anchor(self, by_squares: BySquares, near: State, count: int) -> State:
         """The best car by squares with the effects of a state: from there, and from cars that are drawn."""
         here = by_squares.at(near.effects, near.logs, near)
         begun = [] if here is None else [by_squares.improved(here[1], 6)]
-        begun += [(by_squares.deviance(one), one) for one in self._begun(by_squares, None, near, count)]
-        return min(begun, key=lambda pair: pair[0])[1]
+        drawn = self._cars(by_squares, None, near)
+        begun += _improved(by_squares, [one for some in drawn for one in some[:count]], sum(_ROUNDS))
+        return min(begun, key=_by_deviance)[1]
 
-    def _begun(self, by_squares: BySquares, effect: Effect | None, near: State, count: int, rounds: int = 12
-               ) -> tuple[State, ...]:
-        """The best so many of cars that were drawn around the file's, and as many of those around a state, improved by
-        squares, the best first. A state without the effect is in a valley of its own, whose cars are the better ones
-        before they are improved."""
+    def _cars(self, by_squares: BySquares, effect: Effect | None, near: State) -> tuple[list[_Drawn], list[_Drawn]]:
+        """The best of cars that were drawn around the file's, and as many of those around a state, the best first. A
+        state without the effect is in a valley of its own, whose cars are the better ones before they are improved."""
         prior = by_squares.posterior.prior
         rng = np.random.default_rng(crc32((effect.name if effect else "").encode()))
         trials = effect.trials() if effect else [{}]
-        drawn: tuple[list[tuple[float, State]], ...] = [], []
+        drawn: tuple[list[Any], list[Any]] = [], []
         for number in range(self.draws):
             logs = near.logs * (number % 2)
             if number > 1:
@@ -154,11 +173,23 @@ class UnknownNumbers(MeasuredRoad):
             if effect is not None:
                 # Usual sizes follow the vehicle's by powers of ten (``sized``).
                 effects.append(_drawn(chosen(effect, trials[number // 2 % len(trials)]), rng, float(np.log(10.0)) / 2))
-            if (one := by_squares.at(effects, logs, near)) is not None:
-                drawn[number % 2].append(one)
-        best = [state for some in drawn for _, state in sorted(some, key=lambda pair: pair[0])[:count]]
-        ends = sorted((by_squares.improved(state, rounds) for state in best), key=lambda pair: pair[0])
-        return tuple(state for _, state in ends)
+            drawn[number % 2].append((by_squares.rank(effects, logs, near), effects, logs))
+        first, second = ([state for _, *one in sorted(some, key=_by_deviance)[: self.starts]
+                          if (state := by_squares.at(*one, near)) is not None] for some in drawn)
+        return first, second
+
+
+def _improved(by_squares: BySquares, drawn: Sequence[_Drawn], rounds: int) -> list[_Drawn]:
+    """Cars improved by squares, the best first."""
+    return sorted((by_squares.improved(state, rounds) for _, state in drawn), key=_by_deviance)
+
+
+def _by_gain(one: Screened) -> float:
+    return -one.gain
+
+
+def _by_deviance(one: tuple[float, *tuple[Any, ...]]) -> float:
+    return one[0]
 
 
 def _drawn(one: Chosen, rng: np.random.Generator, spread: float) -> Chosen:

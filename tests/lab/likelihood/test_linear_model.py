@@ -44,7 +44,8 @@ def case() -> Case:
     effects = (tire_damping(150.0), chosen(EFFECTS["sensor_gain"], {"gain": 1.02}))
     state = posterior.state_at(effects, logs, record)
     linear = LinearModel(posterior, state, posterior.number_slopes(state, posterior.prior.steps))
-    own = effect_slopes(linear, effects, logs, free_parameters_of(effects), linear.state.record, state.predictions, None)
+    own = effect_slopes(linear, effects, logs, free_parameters_of(effects), linear.state.record, state.predictions,
+                        None)
     return Case(posterior, state, linear, linear.whitened(own))
 
 
