@@ -558,8 +558,41 @@ def test_another_unit_is_said(tmp_path: Path, read: float, pushed: float, words:
     record = {"accel_z_mps2": bench.moved(NOTHING, push, NOTHING)["accel_z_mps2"] * read}
     (tmp_path / "bench.yaml").write_text(bench.yaml.replace("0.8", "0.8 +- 1%").replace("2000.0", "1500 +- 30%"))
     run = written(tmp_path / "run", record, {"force_n": push(TIME_S) * pushed}, BODY)
-    with pytest.raises(BadInput, match=words):
-        main(["compare", "--vehicle", str(tmp_path / "bench.yaml"), str(run)])
+    for verb in ("compare", "identify"):
+        with pytest.raises(BadInput, match=words):
+            main([verb, "--vehicle", str(tmp_path / "bench.yaml"), str(run)])
+
+
+def test_a_number_far_from_what_its_file_knows_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    push, bench = noise(30.0, 8.0, 4), Bench(0.8, 2000.0, 6.0)
+    record = {"displacement_m": bench.moved(NOTHING, push, NOTHING)["displacement_m"]}
+    (tmp_path / "bench.yaml").write_text(bench.yaml.replace("2000.0", "1800 +- 2%"))
+    run = written(tmp_path / "run", record, {"force_n": push(TIME_S)}, BODY)
+    assert main(["identify", "--vehicle", str(tmp_path / "bench.yaml"), str(run)]) == 0
+    assert "stiffness_n_per_m came out 5.3 standard deviations from what" in " ".join(
+        "".join(capsys.readouterr()).split())
+
+
+def test_two_effects_are_added_together(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Either alone is biased, and it is said that more is missing."""
+    way = noise(8.0, 0.004, 6)
+    rate = way(TIME_S, 1)
+    force_n = np.where(rate > 0, 130.0, 90.0) * rate + 3.0 * np.tanh(rate / 0.002)
+    force_n += np.random.default_rng(1).normal(0.0, 0.05, len(TIME_S))
+    run = written(tmp_path / "run", {"force_n": force_n}, {"displacement_m": way(TIME_S)}, "source: me\n")
+    (tmp_path / "part.yaml").write_text("name: part\nmodel: component\nstiffness_n_per_m: 0 +- 100\n"
+                                        "damping_n_s_per_m: 100 +- 50%\npreload_n: unknown\n")
+
+    def added(names: str) -> str:
+        assert main(["add-effect", names, "--vehicle", str(tmp_path / "part.yaml"), "--out",
+                     str(tmp_path / "with.yaml"), str(run)]) == 0
+        return " ".join(capsys.readouterr().out.split())
+
+    assert "Something more is missing" in added("damper_asymmetry")
+    assert "Something more is missing" not in added("damper_asymmetry+dry_friction:transition_velocity_m_per_s=2e-3")
+    values = {one.effect.name: one.values for one in ridelog.read_vehicle(tmp_path / "with.yaml").effects}
+    assert values["dry_friction"]["friction_force_n"] == pytest.approx(3.0, rel=0.02)
+    assert values["damper_asymmetry"]["rebound_to_bump_ratio"] == pytest.approx(130 / 90, rel=0.01)
 
 
 def test_another_unit_of_another_signal_is_said(tmp_path: Path) -> None:

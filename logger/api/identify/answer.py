@@ -506,17 +506,22 @@ def doubts(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
     if fit.at_bound:
         yield (f"{', '.join(fit.at_bound)} ended at a bound: the bound stopped the fit there; it is not a measured "
                "value.")
-    precision, pull = fit.prior
-    for name, off in zip(fit.parameters, np.abs(pull) / np.sqrt(np.maximum(precision, 1e-300)), strict=True):
-        if off > UNUSUAL_SIGMA:
-            yield (f"{name} came out {off:.1f} standard deviations from what the vehicle's file knows of it: either "
-                   "the file is wrong there, or the model lacks something that biases it.")
+    yield from _far_from_file(fit)
     if not white.passed:
         yield (f"residuals are not white (p = {white.p_value:.2g}): the noise model is incomplete, and the standard "
                "errors are a guide only.")
     if not free_of_road.passed:
         yield (f"residuals follow the input (p = {free_of_road.p_value:.2g}): the model lacks an effect, "
                "which biases the estimates.")
+
+
+def _far_from_file(fit: Fit) -> Iterator[str]:
+    """Which numbers are not what was known of them."""
+    precision, pull = fit.prior
+    for name, off in zip(fit.parameters, np.abs(pull) / np.sqrt(np.maximum(precision, 1e-300)), strict=True):
+        if off > UNUSUAL_SIGMA:
+            yield (f"{name} came out {off:.1f} standard deviations from what the vehicle's file knows of it: either "
+                   "the file is wrong there, or the model lacks something that biases it.")
 
 
 def _p_value(test: Test) -> float | None:
@@ -544,6 +549,7 @@ def measured_lines(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
     yield ""
     yield from _table(fit)
     yield ""
+    yield from _far_from_file(fit)
     yield f"The residual is modelled as {fit.noise.words}."
     yield from _measured_correlations(fit)
     yield from _checks(white, free_of_road)

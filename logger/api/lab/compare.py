@@ -668,6 +668,7 @@ def addition_json(found: AddedEffects) -> dict[str, Any]:
     new = found.new[-1]
     return {
         "effect": new.effect.name, "parameters": dict(new.values), "standard_errors": finite(new.standard_errors),
+        "added": list(found.names), "excess": found.excess,
         "error_before": found.error_before, "error_after": found.error_after,
         "error_refitted": found.error_refitted, "error_as_written": found.error_as_written,
         **lab_words.errors_json(found.steps, found.noise_floor_error),

@@ -174,8 +174,8 @@ class UnknownNumbers(MeasuredRoad):
                 # Usual sizes follow the vehicle's by powers of ten (``sized``).
                 effects.append(_drawn(chosen(effect, trials[number // 2 % len(trials)]), rng, float(np.log(10.0)) / 2))
             drawn[number % 2].append((by_squares.rank(effects, logs, near), effects, logs))
-        first, second = ([state for _, *one in sorted(some, key=_by_deviance)[: self.starts]
-                          if (state := by_squares.at(*one, near)) is not None] for some in drawn)
+        first, second = ([state for _, having, there in sorted(some, key=_by_deviance)[: self.starts]
+                          if (state := by_squares.at(having, there, near)) is not None] for some in drawn)
         return first, second
 
 

@@ -110,7 +110,7 @@ def test_the_gradient_is_that_of_the_objective() -> None:
     assert one.linear.numbers is not None
     numbers, logs = one.linear.numbers, one.state.logs
     own = effect_slopes(one.linear, one.state.effects, logs, free_parameters_of(one.state.effects), one.state.record,
-                        one.state.predictions)
+                        one.state.predictions, None)
 
     def objective(x: Array) -> float:
         there = [each + x[: len(logs)] @ of_car + x[len(logs):] @ of_effects for each, of_car, of_effects in zip(
