@@ -25,8 +25,6 @@ from logger.vehicle.named_parameters import FreeParameter, coordinates_of, free_
 from logger.vehicle.uncertain import NumberErrors
 
 _SCALE = "sprung_mass_kg"
-_DRAWS = 18
-"""Of the input's noise: the standard error of a standard deviation by n draws is 1 / sqrt(2 n) of it, a sixth."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,15 +114,16 @@ def _scatter(linear: LinearModel, slopes: list[Array] | None) -> Array:
     posterior, state = linear.posterior, linear.state
     parts = [one for one in (linear.numbers, slopes) if one is not None]
     columns = linear.without_record_errors([np.vstack(one) for one in zip(*parts, strict=True)])
-    drawn = [posterior.carried_noise(state, draw) for draw in range(_DRAWS)]
+    # The standard error of a standard deviation by so many draws is 1 / sqrt(2 n) of it, a sixth.
+    drawn = [posterior.carried_noise(state, draw) for draw in range(18)]
     found = np.zeros((len(columns[0]), len(columns[0])))
-    pulls = np.zeros((_DRAWS, len(found)))
+    pulls = np.zeros((len(drawn), len(found)))
     for run, (bands, residual) in enumerate(zip(posterior.bands, posterior.residuals(state), strict=True)):
         carried = np.mean([bands.power(one[run]) for one in drawn], axis=0)
         own, white = bands.scatter_whitener(residual, carried)(columns[run]), linear.whiteners[run](columns[run])
         pulls += np.stack([linear.whiteners[run](one[run]) for one in drawn]) @ white.T
         found += own @ own.T - white @ white.T
-    return found + pulls.T @ pulls / _DRAWS
+    return found + pulls.T @ pulls / len(drawn)
 
 
 def with_standard_errors(effects: Sequence[Chosen], free_parameters: Sequence[FreeParameter], deviations: Array

@@ -13,7 +13,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any
 from zlib import crc32
 
@@ -33,12 +32,6 @@ from logger.vehicle.named_parameters import WEAKEST
 
 _Drawn = tuple[float, State]
 """A car with its deviance by squares."""
-_NEAR = 0.1
-"""A model that leaves less than this of what was measured, on what no fit saw, has the numbers of the car about right:
-were they far off, its resonances would be, and leave more (a judgement)."""
-_ROUNDS = 3, 3, 6
-"""Rounds by which starts of all effects, of the best half of them and of the best quarter are improved, one after the
-other (sequential halving: Z. Karnin, T. Koren and O. Somekh, ICML 2013)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,7 +79,8 @@ class UnknownNumbers(MeasuredRoad):
                  pool: ThreadPoolExecutor, progress: Progress) -> list[Screened]:
         """Effects screened on the model, and by squares in cars that are drawn."""
         local = super().screened(base, effects, seen, near, pool, progress)
-        if base.explanation == 0 or base.hold_out.error < _NEAR:
+        # Were numbers far off, the car's resonances would be, and leave more than so little of what was measured.
+        if base.explanation == 0 or base.hold_out.error < UNEXPLAINED:
             return local
         by_squares = self._by_squares(base.posterior)
         anchor = self._anchor(by_squares, base.state, 1)
@@ -94,22 +88,23 @@ class UnknownNumbers(MeasuredRoad):
 
         def begun(one: Screened) -> Screened:
             drawn = self._cars(by_squares, one.effect, anchor)
-            if not (ends := _improved(by_squares, [some[0] for some in drawn if some], _ROUNDS[0])):
+            if not (ends := _improved(by_squares, [some[0] for some in drawn if some], 4)):
                 return one
             return Started(one.effect, one.trials, [one for some in drawn for one in some[1:]], ends,
                            without - ends[0][0])
 
-        def farther(rounds: int, one: Screened) -> Screened:
+        def farther(one: Screened) -> Screened:
             if not isinstance(one, Started):
                 return one
-            ends = _improved(by_squares, one.ends, rounds)
+            ends = _improved(by_squares, one.ends, 4)
             return replace(one, ends=ends, gain_by_squares=without - ends[0][0])
 
         found = sorted(pool.map(begun, local), key=_by_gain)
-        for halvings, rounds in enumerate(_ROUNDS[1:], 1):
-            best = len(found) >> halvings
-            found[:best] = sorted(pool.map(partial(farther, rounds), found[:best]), key=_by_gain)
-        return sorted(found, key=_by_gain)
+        # Sequential halving: Z. Karnin, T. Koren and O. Somekh, ICML 2013.
+        for best in (len(found) // 2, len(found) // 4):
+            found[:best] = pool.map(farther, found[:best])
+            found.sort(key=_by_gain)
+        return found
 
     def stripped(self, now: Baseline, name: str) -> None:  # type: ignore[override]
         """It is the fitted one."""
@@ -120,7 +115,7 @@ class UnknownNumbers(MeasuredRoad):
             return fit_roughly(score, base, one, least)
         found = fit_roughly(score, base, replace(one, trials=one.trials[:1]))
         by_squares = self._by_squares(base.posterior)
-        ends = sorted([*one.ends, *_improved(by_squares, one.others, sum(_ROUNDS))], key=_by_deviance)
+        ends = sorted([*one.ends, *_improved(by_squares, one.others, 12)], key=_by_deviance)
         least, best = ends[0]
         self.ends[one.effect.name] = sum(deviance < least + INDISTINGUISHABLE for deviance, _ in ends), len(ends)
         found.append(CandidateFit.of(score, self._likeliest(
@@ -155,7 +150,7 @@ class UnknownNumbers(MeasuredRoad):
         here = by_squares.at(near.effects, near.logs, near)
         begun = [] if here is None else [by_squares.improved(here[1], 6)]
         drawn = self._cars(by_squares, None, near)
-        begun += _improved(by_squares, [one for some in drawn for one in some[:count]], sum(_ROUNDS))
+        begun += _improved(by_squares, [one for some in drawn for one in some[:count]], 12)
         return min(begun, key=_by_deviance)[1]
 
     def _cars(self, by_squares: BySquares, effect: Effect | None, near: State) -> tuple[list[_Drawn], list[_Drawn]]:
@@ -180,7 +175,7 @@ class UnknownNumbers(MeasuredRoad):
 
 
 def _improved(by_squares: BySquares, drawn: Sequence[_Drawn], rounds: int) -> list[_Drawn]:
-    """Cars improved by squares, the best first."""
+    """Cars improved by squares, the best first; twelve rounds lead to the end."""
     return sorted((by_squares.improved(state, rounds) for _, state in drawn), key=_by_deviance)
 
 
