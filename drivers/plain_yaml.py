@@ -200,7 +200,7 @@ class Node:
 def _limits(low: float | None, high: float | None) -> str:
     if low is None:
         return "" if high is None else f" of at most {high:g}"
-    return f" of at least {low:g}" if high is None else f" from {low:g} to {high:g}"
+    return f" of at least {low:g}" if high is None else f" from {low:g} to {high:g}".replace("e+0", "e")
 
 
 N = TypeVar("N", bound=Node)

@@ -111,7 +111,7 @@ class RecordedWords:
         """A number from ``least`` to ``most``."""
         value = self._said.get(key, usual)
         if type(value) not in (int, float) or not least <= value <= most:
-            raise self._wrong(key, f"a number from {least:g} to {most:g}")
+            raise self._wrong(key, f"a number from {least:g} to {most:g}".replace("e+0", "e"))
         return float(value)
 
     def number_or_none(self, key: str, usual: float | None, least: float, most: float) -> float | None:

@@ -40,8 +40,8 @@ class Quantity:
         size = np.abs(values)
         if (wild := ~(size <= self.largest)).any():
             row = int(np.argmax(wild))
-            raise BadInput(f"{place(row)}: expected {name} within {self.largest:g} {self.unit}".rstrip()
-                           + f", found {values[row]:g}")
+            within = f"{self.largest:g} {self.unit}".replace("e+0", "e").rstrip()
+            raise BadInput(f"{place(row)}: expected {name} within {within}, found {values[row]:g}")
         return np.where(size < self.least, 0.0, values)
 
 

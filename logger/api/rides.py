@@ -266,7 +266,8 @@ def _zone(zone: CautionZone, value: float, unit: str) -> dict[str, Any]:
 
 def lines(result: RideComfort, name: str) -> list[str]:
     """The lines a person sees; ``name`` is that of the file."""
-    printed = [f"{name}: {result.vertical.duration_s:.1f} s at {result.rate_hz:.6g} Hz, "
+    answer, *conclusions = _conclusions(result)
+    printed = [answer, "", f"{name}: {result.vertical.duration_s:.1f} s at {result.rate_hz:.6g} Hz, "
              f"weighting {result.weighting.name.capitalize()}", ""]
     heads = ("axis", "a_w m/s2", "MTVV m/s2", "VDV m/s1.75", "crest", "MTVV/a_w", "VDV/a_wT^1/4")
     printed.append(f"{heads[0]:5}" + "".join(f"{head:>13}" for head in heads[1:]))
@@ -277,7 +278,7 @@ def lines(result: RideComfort, name: str) -> list[str]:
         printed.append(f"{axis:5}" + "".join(f"{value:13.3f}" if isfinite(value) else f"{'-':>13}"
                                                   for value in values))
     exponential = ", ".join(f"{result.axes[axis].mtvv_exponential_mps2:.3f}" for axis in sorted(result.axes))
-    printed += [f"MTVV with exponential averaging: {exponential} m/s2", "", *_conclusions(result), "",
+    printed += [f"MTVV with exponential averaging: {exponential} m/s2", "", *conclusions, "",
               f"Method: {METHOD}; the mean is taken off."]
     if result.unseen_from_hz is not None:
         printed.append(f"The record cannot show what lies above {result.unseen_from_hz:.4g} Hz. The standard counts it "
@@ -296,9 +297,11 @@ def _conclusions(result: RideComfort) -> list[str]:
         lines.append(f"Comfort: no words: ISO 2631-1 has none for {result.weighting.name.capitalize()}.")
     elif len(result.axes) > 1:
         totals = _totals(result)
-        lines.append(f"Feels {_spoken(totals['total_comfort'])}: {totals['total_a_w_mps2']:.3f} m/s2 over three axes.")
+        lines.append(f"Feels {_spoken(totals['total_comfort'])}: a_w {totals['total_a_w_mps2']:.3f} m/s2 over three "
+                     "axes.")
     else:
-        lines.append(f"Feels {_spoken(_word(result, result.vertical.a_w_mps2))}.")
+        lines.append(f"Feels {_spoken(_word(result, result.vertical.a_w_mps2))}: a_w "
+                     f"{result.vertical.a_w_mps2:.3f} m/s2.")
     if not result.weighting.is_sickness:
         lines.append(_which_to_use(result))
     health = _health(result)
@@ -307,7 +310,7 @@ def _conclusions(result: RideComfort) -> list[str]:
     n2, n4, dose = (health["caution_zone"][name] for name in ("n2", "n4", "vdv"))
     return [
         *lines,
-        f"Health, {health['daily_hours']:.3g} h a day like this:",
+        f"Health, for {health['daily_hours']:.3g} h a day of this ride:",
         f"  A(8) {health['a8_mps2']:.3f} m/s2 ({health['a8_axis']}), {_spoken(health['a8_verdict'])}"
         f"{_from_hours(health['hours_to_a8_action'])}",
         f"  VDV {health['daily_vdv_mps175']:.2f} m/s1.75 ({health['vdv_axis']}), {_spoken(health['vdv_verdict'])}"
@@ -323,7 +326,7 @@ def _which_to_use(result: RideComfort) -> str:
     if not wanted:
         return "a_w is enough: no crest factor above 9, no ratio above 1.5 or 1.75."
     which = "; ".join(f"{axis}: {' and '.join(name.upper() for name in names)}" for axis, names in wanted.items())
-    return f"a_w alone understates it, there are shocks. Report with it {which}."
+    return f"a_w alone understates the ride, as there are shocks. Report {which} as well."
 
 
 def _spoken(word: str | None) -> str:

@@ -14,7 +14,7 @@ from logger.api.question import function
 from logger.api.shown import CommandResult, Shown, table
 from logger.chart_data import Array, Chart, Curves, Line, line
 from logger.errors import BadInput
-from logger.report.quantities import area_lines, area_values
+from logger.report.quantities import area_lines, area_values, measured
 from logger.report.summary import IRI_CLASSES
 from logger.roads import elevation_spectrum, iso8608
 from logger.roads.elevation_spectrum import BandedSpectrum, TrackClass, track_class
@@ -326,7 +326,7 @@ def _track_lines(track: TrackClass) -> list[str]:
         f"; the road is too short or too odd to be sure: it may be {' or '.join(found.classes)}"
     return [
         f"class      {found.road_class}: {IRI_CLASSES[found.road_class]}{doubt}",
-        f"Gd(n0)     {found.gd_n0_cm3:.4g} ± {found.gd_n0_std_cm3:.2g} cm3, from waves of "
+        f"Gd(n0)     {measured(found.gd_n0_cm3, found.gd_n0_std_cm3)} cm3, from waves of "
         f"{1 / found.highest_cpm:.2g} to {1 / found.lowest_cpm:.2g} m",
         f"waviness   {found.waviness:.2f} ± {found.waviness_std:.2f} (the classes have 2)",
         f"IRI        {track.iri_m_per_km:.2f} m/km; this Gd(n0) means {iri_from_gd_n0(found.gd_n0_cm3):.2f} by "

@@ -264,11 +264,11 @@ def _summary(drives: Sequence[DriveSections], length_m: float, units: DisplayUni
     known_m = np.concatenate([one.figures.known_m for one in drives])
     driven_m = sum(float(one.figures.driven_m.sum()) for one in drives)
     name, unit_m = units.way
-    yield (f"{counted(len(drives), 'drive')}, {driven_m / unit_m:.2f} {name} in {counted(count, 'section')} of "
-           f"{_length_words(length_m)}")
+    extent = (f"{counted(len(drives), 'drive')}, {driven_m / unit_m:.2f} {name} in {counted(count, 'section')} of "
+              f"{_length_words(length_m)}")
     total_m = float(known_m.sum())
     if total_m <= 0:
-        yield "The IRI is known nowhere."
+        yield from ("No section has an IRI.", extent)
         return
     mean, error = _mean([one.whole for one in drives if one.whole.known_m[0] > 0])
     label, scale = units.iri
@@ -278,6 +278,7 @@ def _summary(drives: Sequence[DriveSections], length_m: float, units: DisplayUni
     words = [word for one in drives for word in one.condition]
     shares = {word: float(known_m[[here == word for here in words]].sum()) / total_m for word in FEDERAL_WORDS}
     yield "Of that: " + ", ".join(f"{word} {share:.0%}" for word, share in shares.items())
+    yield extent
 
 
 def _mean(wholes: Sequence[RoadSections]) -> tuple[float, float]:

@@ -68,7 +68,7 @@ def of_passes(files: Sequence[LoggedFile], rows: Sequence[WindowRecord], figures
     known = sum(placed(one) and not _has_iri(one) for one in rows)
     return counting((*of_files(files), LeftOut(every - len(rows), "row", "of other days, or without a date"),
                      LeftOut(len(rows) - figures_of, "row", "without a place"),
-                     LeftOut(known, "row", "without an IRI that counts")))
+                     LeftOut(known, "row", "without a usable IRI")))
 
 
 def of_sections(files: Sequence[LoggedFile], used: Collection[WindowRecord], on_route: bool) -> tuple[LeftOut, ...]:
@@ -76,7 +76,7 @@ def of_sections(files: Sequence[LoggedFile], used: Collection[WindowRecord], on_
     every = sum(len(one.records) for one in files)
     why = "off the route, or without a place" if on_route else "without a way"
     return counting((*of_files(files), LeftOut(every - len(used), "row", why),
-                     LeftOut(sum(not _has_iri(one) for one in used), "row", "without an IRI that counts")))
+                     LeftOut(sum(not _has_iri(one) for one in used), "row", "without a usable IRI")))
 
 
 def _has_iri(one: WindowRecord) -> bool:

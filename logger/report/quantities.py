@@ -43,7 +43,7 @@ def _product(words: str) -> str:
 def measured(value: float, error: float | None) -> str:
     """A value with its standard error, in no more digits than it deserves: ``85 ± 4``, ``1.61e6 ± 0.04e6``."""
     if error is None or not isfinite(error) or not error > 0 or not isfinite(value):
-        return f"{value:.3g}"
+        return f"{value:.3g}".replace("e+0", "e")
     decimals = 1 - floor(log10(error)) - (error / 10.0 ** floor(log10(error)) >= 2)
     size = max(abs(value), error)
     if 1e-3 <= size < 1e6:

@@ -96,7 +96,8 @@ class Parameter:
         """What it may be, in words: "1 or 2", "0.2 to 5"."""
         if len(self.choices) > 2:
             return "one of " + ", ".join(f"{choice:g}" for choice in self.choices)
-        return " or ".join(f"{choice:g}" for choice in self.choices) or f"{self.low:g} to {self.high:g}"
+        return " or ".join(f"{choice:g}" for choice in self.choices) or f"{self.low:g} to {self.high:g}".replace(
+            "e+0", "e")
 
     def coordinate(self, value: float) -> float:
         """Where a value lies on the scale that fits move on."""

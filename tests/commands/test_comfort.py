@@ -107,9 +107,9 @@ def test_a_ride_with_a_blow_says_what_to_use(tmp_path: Path, capsys: pytest.Capt
     assert result["crest_factor"] > 9
     assert result["report_beside_a_w"] == ["mtvv", "vdv"]
     text = on_screen(capsys, path, "--daily-hours", "8")
-    assert "a_w alone understates it, there are shocks. Report with it z: MTVV and VDV." in text
+    assert "a_w alone understates the ride, as there are shocks. Report z: MTVV and VDV as well." in text
     assert "above 50 Hz" in text
-    assert "Health, 8 h a day like this:" in text
+    assert "Health, for 8 h a day of this ride:" in text
 
 
 def test_silence_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

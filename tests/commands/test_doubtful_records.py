@@ -187,7 +187,7 @@ def test_an_axis_that_stands_still_has_no_verdict_and_is_named(tmp_path: Path) -
             assert found["axes"][axis]["crest_factor"] is None
         assert done.stderr.count("a sensor that works shows some noise") == 2
     shown = called("comfort", path).stdout
-    assert "Report with it x" not in shown and "y:" not in shown
+    assert "Report x" not in shown and "y:" not in shown
     assert found["a_w_mps2"] == pytest.approx(alone["a_w_mps2"], rel=0.01)
 
 

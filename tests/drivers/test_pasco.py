@@ -110,7 +110,7 @@ def test_a_profile_of_ones_own(tmp_path):
     ("changes", "says"),
     [
         ({"version": None}, "expected the key 'version' here, it is missing"),
-        ({"version": "one"}, "expected a whole number from 1 to 1e+06, found 'one' for 'version'"),
+        ({"version": "one"}, "expected a whole number from 1 to 1e6, found 'one' for 'version'"),
         ({"verified": "no idea"}, "expected true or false, found 'no idea' for 'verified'"),
         ({"name": [3]}, "expected a text, found a list for 'name'"),
         ({"framing": "packets"}, "expected one of frames, lines, found 'packets' for 'framing'"),

@@ -46,8 +46,8 @@ def test_commands_on_logs_count_what_they_leave_out(
     line = " ".join((DAMAGED["unit"], DAMAGED["why"]))  # type: ignore[arg-type]
     assert left_out(capsys, "convert", logs, "--to", tmp_path / "a.csv") == {line: 1}
     assert left_out(capsys, "report", logs, "--out", tmp_path / "a.html") == {line: 1}
-    assert left_out(capsys, "sections", logs) == {line: 1, "row without an IRI that counts": 3}
-    assert left_out(capsys, "passes", logs) == {line: 1, "row without an IRI that counts": 3, "row without a place": 3}
+    assert left_out(capsys, "sections", logs) == {line: 1, "row without a usable IRI": 3}
+    assert left_out(capsys, "passes", logs) == {line: 1, "row without a usable IRI": 3, "row without a place": 3}
     by_fleet = left_out(capsys, "fleet", "ingest", logs, "--to", tmp_path / "town", "--car", "a")
     assert by_fleet[line] == 1
     assert by_fleet["row without a place or a direction"] >= 3
@@ -66,7 +66,7 @@ def test_of_a_drive_the_lab_counts_standing_beginnings_and_holes() -> None:
     found = {one.why: one.amount for one in runs_left_out(driven_stretches(one))}
     assert found == {
         "in which nothing drove it or nothing was read": pytest.approx(10.0, abs=0.1),
-        "at the beginning of runs, as the car's past is not known": pytest.approx(4.0, abs=0.1)}
+        "at the beginning of runs, as the motion before is unknown": pytest.approx(4.0, abs=0.1)}
     without = replace(one, usable=None, speed_mps=np.full(count, 10.0))
     assert {one.amount for one in runs_left_out(driven_stretches(without))} == {2.0}
 

@@ -44,7 +44,7 @@ def test_sections_count_what_is_known_and_add_up(logs: Path, capsys: pytest.Capt
 def test_words_for_people_in_both_systems(logs: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["sections", str(logs), "--length", "0.1mi"]) == 0
     said = capsys.readouterr().out
-    assert said.splitlines()[0] == "1 drive, 0.14 mi in 2 sections of 0.1 mi"
+    assert said.splitlines()[2] == "1 drive, 0.14 mi in 2 sections of 0.1 mi"
     assert "Mean IRI 111 in/mi" in said
     assert "34" in said.splitlines()[6].split()  # 15.24 m/s in miles an hour
     assert "half car on both wheelpaths (HRI)" in said

@@ -84,7 +84,8 @@ def effect_table(known: Iterable[Effect]) -> str:
 
 
 def _effect(one: Effect) -> list[str]:
-    numbers = [(f"`{each.name}`", f"{each.start:g}", each.allowed, each.meaning) for each in one.parameters]
+    numbers = [(f"`{each.name}`", f"{each.start:g}".replace("e+0", "e"), each.allowed, each.meaning)
+               for each in one.parameters]
     return [f"## {one.name}", f"{one.title[0].upper()}{one.title[1:]}.",
             *([_table(("parameter", "usual", "allowed", "meaning"), numbers)] if numbers else []),
             f"- What it leaves in a record: {one.signature}.\n- To see it: {one.shown_by}.\n- Source: {one.source}."]

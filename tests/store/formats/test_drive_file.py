@@ -80,7 +80,7 @@ def spoilt(line: int, row: str) -> str:
     (spoilt(7, "0.05,0.1,10"), ":7: expected 4 fields"),
     (spoilt(7, "0.04,0.1,10,0.5"), ":7: expected a time after 0.04 s, found 0.04"),
     (spoilt(7, "0.055,0.1,10,0.5"), ":7: expected samples evenly 0.01 s apart, found a step of 0.015 s"),
-    (spoilt(7, "0.05,2e6,10,0.5"), ":7: expected accel_z_mps2 within 1e+06 m/s2, found 2e+06"),
+    (spoilt(7, "0.05,2e6,10,0.5"), ":7: expected accel_z_mps2 within 1e6 m/s2, found 2e+06"),
     (spoilt(7, "0.05,0.1,200,0.5"), ":7: expected speed_mps within 150 m/s, found 200"),
 ])
 def test_what_is_no_drive_is_refused_with_its_line(tmp_path: Path, text: str, complaint: str) -> None:
