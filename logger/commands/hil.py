@@ -111,9 +111,8 @@ class PlayedDrive:
                       f"  late: median {half:.1f} ms, 99th percentile {most:.1f} ms ({LATE_MS:g} allowed: {LATE_WHY}), "
                       f"largest {longest:.1f} ms{'' if self.in_time else '  TOO LATE'}"]
         if self.agreement is not None:
-            lines += _agreement_text(self.agreement)
-            lines.append("The log AGREES with the replay." if self.agreement.ok else
-                         "The log does NOT AGREE with the replay.")
+            verdict = "AGREES" if self.agreement.ok else "does NOT AGREE"
+            lines = [f"The log {verdict} with the replay.", *lines, *_agreement_text(self.agreement)]
         else:
             lines.append("Compare when its log is here: ridelog hil DUMP --log DIR --config FILE, with its settings.")
         return "\n".join(lines)
