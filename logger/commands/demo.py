@@ -52,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--out", metavar="DIR", type=Path, help=f"folder for what is written (default: {DRIVE_DIR})")
     parser.add_argument("--unpack", action="store_true",
                         help="with --lab, --field or --car: only write the drives, to find it yourself")
-    parser.add_argument("--json", action="store_true", help="one JSON object instead of text")
+    parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -38,7 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--from", dest="logs", metavar="LOGDIR", type=Path, help="logs (default: the service's)")
     parser.add_argument("--dumps", action="store_true", help="also the recorded dumps")
     parser.add_argument("--config", metavar="FILE", type=Path, help="settings of the service")
-    parser.add_argument("--json", action="store_true", help="print one JSON object")
+    parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
     # What follows is typed by nobody: systemd/ridelog-export@.service passes it. --unmounted: say in the note that this
     # stick may be pulled; --removed: it was, and ridelog status no longer shows it; --mounted: only if DIR is a mount
     # point; --note: the file of the note; --led: the light that shows the notes, /sys/class/leds/NAME.

@@ -50,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--vehicle", metavar="NAME|FILE",
                         help="the car whose model recognises the road (default: the one that the settings or the "
                              "recording name)")
-    parser.add_argument("--json", action="store_true", help="one JSON object instead of text")
+    parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
     group = parser.add_argument_group("recordings of phones and other loggers")
     group.add_argument("--csv", nargs="+", type=Path, default=[], metavar="FILE|FOLDER",
                        help="recordings, in place of DUMP; a folder holds the files of one recording")

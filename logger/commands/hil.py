@@ -53,7 +53,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--log", metavar="DIR", type=Path, help="folder of the service's logs, or a copy of it")
     parser.add_argument("--config", metavar="FILE", type=Path, help="settings of the service (default: those of 'run')")
     parser.add_argument("--seconds", metavar="N", type=float, help="only the first N seconds of the recording")
-    parser.add_argument("--json", action="store_true", help="one JSON object instead of text")
+    parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 
 
 def run(args: argparse.Namespace) -> int:

@@ -36,7 +36,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--rate", metavar="N", type=float, default=0.0, help="1: real time; 0 (default): at full speed")
     parser.add_argument("--config", metavar="FILE", type=Path, help="settings of that drive")
     parser.add_argument("--vehicle", metavar="NAME|FILE", help="instead of the vehicle that the recording names")
-    parser.add_argument("--json", action="store_true", help="one JSON object instead of text")
+    parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 
 
 def run(args: argparse.Namespace) -> int:

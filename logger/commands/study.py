@@ -38,7 +38,7 @@ _BAR = 30
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("name", nargs="?", metavar="NAME",
                         help="the study, as --list names it; dissertation, field (other papers) or roads (public "
-                             "records): all of that shelf; or all")
+                             "records): all of that group; or all")
     parser.add_argument("folder", nargs="?", type=Path, metavar="DIR", help="the data of a study that needs some")
     parser.add_argument("--list", action="store_true", help="list the studies there are")
     parser.add_argument("--quick", action="store_true", help="a tenth of the draws and grid points")
@@ -142,7 +142,7 @@ def _list(known: list[Study], wants_json: bool) -> None:
         print(json.dumps({"studies": [_in_short(one) for one in known]}))
         return
     if not known:
-        print("No studies on this shelf.")
+        print("No studies in this group.")
         return
     name, where, words = (max(len(getattr(one, what)) for one in known) for what in ("called", "where", "words"))
     for one in known:
