@@ -141,15 +141,11 @@ class MovedCar:
             rounded = exp(2 * key[1] / _STEPS_PER_E) * psd_m3 / psd_m3[middle]
             is_like = like is not None and bool(like.corners)
             if not is_like and self._found:
-                like = self._found[min(self._found, key=lambda one: _apart(one, key))]
+                like = self._found[min(self._found, key=lambda one: int(np.abs(np.subtract(one, key)).sum()))]
             self._found[key] = linearised(self.car, self.output, exp(key[0] / _STEPS_PER_E), wave_number_cpm, rounded,
                                           () if like is None else like.corners,
                                           _WHOLE_TURNS if is_like else _MOST_TURNS)
         return self._found[key]
-
-
-def _apart(one: tuple[int, int, int], other: tuple[int, int, int]) -> int:
-    return sum(abs(a - b) for a, b in zip(one, other, strict=True))
 
 
 def linearised(car: Car, output: Output, speed_mps: float, wave_number_cpm: Array, psd_m3: Array,

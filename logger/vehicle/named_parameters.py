@@ -320,11 +320,8 @@ def free_number(effects: Sequence[Chosen], free: FreeParameter, start: float | N
     if not parameter.low <= low < high <= parameter.high:
         raise ValueError(f"{name}: expected bounds within {parameter.low:g} to {parameter.high:g}, found {low:g} to "
                          f"{high:g}")
-    return Free(name, value, low, high, usual=_usual(parameter, value) if parameter.scale is Scale.LINEAR else None)
-
-
-def _usual(parameter: Parameter, value: float) -> float:
-    return abs(value) or parameter.usual_range()
+    usual = (abs(value) or parameter.usual_range()) if parameter.scale is Scale.LINEAR else None
+    return Free(name, value, low, high, usual=usual)
 
 
 def slope_of(parameter: Parameter, value: float) -> float:

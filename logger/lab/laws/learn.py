@@ -51,11 +51,6 @@ def screen_law(base: Baseline, draft: Draft, misalignment: Misalignment) -> Scre
     return Screened(effect, tuple(sorted(trials, key=lambda trial: -trial.gain)))
 
 
-def free_count(one: Screened) -> int:
-    """Number of free parameters of an effect."""
-    return sum(parameter.is_free for parameter in one.effect.parameters)
-
-
 def _gauss_newton_trial(base: Baseline, draft: Draft, values: dict[str, float]) -> Trial:
     """The trial of a law with several strengths, after one Gauss-Newton step from these values."""
     linear, state = base.linear, base.state
@@ -406,7 +401,7 @@ class _LawChoice:
 
     def _screened_gain(self, base: Baseline, one: Screened) -> float:
         """Gain in evidence by screening, less the cost of a law's numbers."""
-        return one.gain - free_count(one) * float(np.log(base.posterior.freedom))
+        return one.gain - sum(each.is_free for each in one.effect.parameters) * float(np.log(base.posterior.freedom))
 
     def _is_accepted(self, one: LawFit) -> bool:
         """Whether a law is accepted as an effect is, and does not raise the hold-out error."""

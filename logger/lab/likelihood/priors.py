@@ -8,7 +8,7 @@ numbers on their logarithms.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -78,11 +78,6 @@ class Tolerance:
         return self.band * self.numbers
 
 
-def is_length(names: Sequence[str]) -> Bools:
-    """Which of a vehicle's numbers (p,) are lengths."""
-    return np.array([name.endswith(("cg_distance_m", "contact_patch_m")) for name in names], dtype=bool)
-
-
 @dataclass(frozen=True)
 class VehiclePrior:
     """Prior of a vehicle's numbers: their names, and (p,) standard deviations and difference steps of their logarithms.
@@ -96,7 +91,7 @@ class VehiclePrior:
     def of(vehicle: Vehicle, tolerance: Tolerance) -> VehiclePrior:
         """The prior of a vehicle's numbers."""
         names = sized(vehicle)
-        lengths = is_length(names)
+        lengths = np.array([name.endswith(("cg_distance_m", "contact_patch_m")) for name in names], dtype=bool)
         # A step of a length, by which waves come late, has to be much smaller.
         usual = np.where(lengths, tolerance.lengths, tolerance.numbers)
         deviations = [tolerance.by_name.get(name, one) for name, one in zip(names, usual, strict=True)]

@@ -141,11 +141,6 @@ class PlannedDrive:
         after = self.posterior.predict((*there.effects, one), there.logs, self._no_errors(self.posterior), rough=True)
         return after[0] - self._here
 
-    @property
-    def most_mps2(self) -> float:
-        """The largest acceleration of the sensor."""
-        return float(np.abs(self.run.measured_mps2).max())
-
     def information(self, changes: Array, signals: Sequence[int]) -> FisherInformation:
         """Information on effects' changes (m, (1 + s) n) by the sensor and some of the signals alone."""
         return information(self.model(signals), [self._of_kept(changes, signals)])
@@ -156,7 +151,8 @@ class PlannedDrive:
         chosen_signals = tuple(run.signals[one] for one in signals)
         fewer = replace(run, facts=replace(run.facts, signals=chosen_signals), more=run.more[list(signals)])
         posterior = self._posterior_of(fewer)
-        expected = [self._whitener(fewer, one) for one in posterior.bands]
+        expected = [JointWhitener([Whitener(one, levels) for one, levels in zip(
+            bands.each, self.levels(fewer, bands), strict=True)]) for bands in posterior.bands]
         state = self._state_of(posterior, self._of_kept(self._here, signals))
         return LinearModel(posterior, state, [self._of_kept(self.numbers, signals)], expected)
 
@@ -169,11 +165,6 @@ class PlannedDrive:
         kept = [0, *(1 + one for one in signals)]
         parts = columns.reshape(*columns.shape[:-1], -1, self.run.count)[..., kept, :]
         return np.asarray(parts.reshape(*columns.shape[:-1], -1))
-
-    def _whitener(self, run: Run, bands: JointBands) -> JointWhitener:
-        """The whitening filter for the expected noise."""
-        return JointWhitener([Whitener(one, levels)
-                              for one, levels in zip(bands.each, self.levels(run, bands), strict=True)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -292,7 +283,7 @@ def _possible(there: PlannedCar, noise: SensorNoise, road: Track, speed_mps: flo
     if (road.end_m - road.start_m) / speed_mps < _LEAST_S:
         return None
     drive = PlannedDrive(at_speed("next", road, there.nominal, speed_mps, signals, MOST_S), there, noise)
-    return drive if drive.most_mps2 < STANDARD_GRAVITY_MPS2 else None
+    return drive if np.abs(drive.run.measured_mps2).max() < STANDARD_GRAVITY_MPS2 else None
 
 
 def _seconds(drive: PlannedDrive) -> float:

@@ -11,7 +11,6 @@ from logger.arrays import Array
 from logger.chart_data import CURVE_POINTS, CURVE_REACH
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.vehicle.compose import Car
-from logger.vehicle.laws import CornerLaws
 
 RATE, TRAVEL = "rate", "travel"
 
@@ -60,7 +59,8 @@ def fitted_car(posterior: Posterior, stood: State, found: State) -> FittedCar:
             reach = float(np.quantile(size[:, wheel], CURVE_REACH))
             at = np.linspace(-reach, reach, CURVE_POINTS)
             # An effect such as roll turns two wheels into four: the same axle, another number.
-            old, new = (_force_n(car.laws[_wheels(car)[axle]], motion, at) for car in (before, after))
+            old, new = (laws.by_rate_n(at) if motion == RATE else laws.stiffness_n_per_m * at + laws.by_travel_n(at)
+                        for laws in (car.laws[_wheels(car)[axle]] for car in (before, after)))
             curves.append(ForceCurve(axle, motion, at, old, new))
     return FittedCar(moved, tuple(curves))
 
@@ -69,8 +69,3 @@ def _wheels(car: Car) -> dict[str, int]:
     """The number of one wheel of each axle."""
     rear = next((number for number, one in enumerate(car.laws) if one.rear), None)
     return {"front": 0} if rear is None else {"front": 0, "rear": rear}
-
-
-def _force_n(laws: CornerLaws, motion: str, at: Array) -> Array:
-    """Force of a wheel's suspension (n,) [N]."""
-    return laws.by_rate_n(at) if motion == RATE else laws.stiffness_n_per_m * at + laws.by_travel_n(at)

@@ -19,7 +19,7 @@ from logger.lab.likelihood.distance_error import unusual_distance_error_m
 from logger.lab.likelihood.noise_floor import sensor_noise_of
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.residual_tests.tests import LEAST_SHARE
-from logger.lab.residuals.sensor_drift import Drift, drifts_of
+from logger.lab.residuals.sensor_drift import Drift, drift_of
 from logger.runs import Run
 
 
@@ -60,8 +60,9 @@ def removed_from(posterior: Posterior, plain: Sequence[Array], state: State) -> 
     fitted, whole = _power(runs, state.predictions), _power(runs, plain) + outside
     record = [error.without_distance_error(k) for error, k in zip(posterior.record_errors, state.record, strict=True)]
     at_recorded_distances = _power(runs, posterior.predict(state.effects, state.logs, record))
-    drifts = drifts_of(runs, posterior.without_rounding().residuals(state),
-                       sensor_noise_of(posterior, state).deviation_mps2)
+    noise_mps2 = sensor_noise_of(posterior, state).deviation_mps2
+    drifts = tuple(drift_of(run, run.main(one), noise_mps2)
+                   for run, one in zip(runs, posterior.without_rounding().residuals(state), strict=True))
     without_drift = _power(runs, [_with_drift(one, drift)
                                   for one, drift in zip(state.predictions, drifts, strict=True)])
     if not fitted - without_drift > LEAST_SHARE * fitted:

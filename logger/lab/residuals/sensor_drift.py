@@ -89,11 +89,6 @@ def drift_of(run: Run, residual: Array, noise_mps2: float) -> Drift:
     return Drift(run.name, best.form, best.size_mps2, best.time_s, best.curve(time_s), rate)
 
 
-def drifts_of(runs: Sequence[Run], residuals: Sequence[Array], noise_mps2: float) -> tuple[Drift, ...]:
-    """The drifts of several runs."""
-    return tuple(drift_of(run, run.main(one), noise_mps2) for run, one in zip(runs, residuals, strict=True))
-
-
 class _Cosines:
     """The first orthonormal cosines (k, n) of n samples: those that count, and some more for the noise."""
 
