@@ -157,6 +157,12 @@ def _long(text: str) -> str:
     return "\n".join(f"        {line + ' ' * (number < len(lines))!r}" for number, line in enumerate(lines, 1))
 
 
+def handed_on(force: str = "force", between: str = "BODY_AND_WHEEL", states: int = 0) -> str:
+    """The method of a force that gets the law's numbers as they are, between these ends, with states at rest at 0."""
+    rest = f", rates, memory={(0.0,) * states!r}" if states else ""
+    return f"def laws(self, p, laws):\n    return laws.with_law(Between.{between}, {force}, p{rest})"
+
+
 _EXPONENT = "power_ratio"  # what laws that are powers call theirs
 FormatNumber = Callable[..., str]
 """A number of the law in words, with its standard error and unit, by its name: ``say("yield_force_n")`` is "161 ± 4 N";

@@ -12,16 +12,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
+from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, handed_on, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _STIFFNESS = """
 def changed(p, seen):
     speed_mps = np.minimum(np.maximum(seen.speed_mps, {slowest!r}), {fastest!r})
     return p.changed_n_per_m * (speed_mps / {mean!r} - 1.0) * seen.{motion}
-"""
-_STIFFNESS_METHOD = """def laws(self, p, laws):
-    return laws.with_law(Between.{between}, changed, p)
 """
 _DAMPING = """
 def changed(p, seen):
@@ -90,7 +87,7 @@ class ChangingWithSpeed(Family):
                               step=rounded(0.1 * size))
         return self._draft(f"{of} whose stiffness changes with the driving speed", of, (parameter,),
                            _STIFFNESS.format(slowest=slowest, mean=mean, fastest=fastest, motion=motion),
-                           _STIFFNESS_METHOD.format(between=between))
+                           handed_on("changed", between))
 
     def _draft(self, title: str, variant: str, parameters: tuple[Parameter, ...], functions: str, method: str,
                places: tuple[float, ...] = ()) -> Draft:

@@ -6,16 +6,13 @@ Beyond a clearance it answers with k (x - d) + c x', and lets go where that woul
 
 from __future__ import annotations
 
-from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
+from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, handed_on, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _FUNCTIONS = """
 def force(p, seen):
     beyond_m = seen.travel_m - p.clearance_m
     return (beyond_m > 0.0) * np.maximum(p.stiffness_n_per_m * (beyond_m + p.damping_time_s * seen.rate_mps), 0.0)
-"""
-_METHOD = """def laws(self, p, laws):
-    return laws.with_law(Between.BODY_AND_WHEEL, force, p)
 """
 
 
@@ -36,7 +33,7 @@ class ExtensionStop(Family):
                       context.reach("travel_m", 1.0), None, Scale.LOG, clear_m, "extension until it is met"),
             Parameter("damping_time_s", 0.01, 0.0, 1.0, None, Scale.LINEAR, (0.01,), "its damping over its stiffness",
                       step=0.001))
-        return [self.draft(parameters, _METHOD, _FUNCTIONS, title="a stop in extension", at="loop")]
+        return [self.draft(parameters, handed_on(), _FUNCTIONS, title="a stop in extension", at="loop")]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         return (f"a stop in extension of {say('stiffness_n_per_m', 0.001, 'N/mm')} beyond "

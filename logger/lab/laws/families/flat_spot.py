@@ -12,7 +12,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
+from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, handed_on, rounded
 from logger.lab.laws.repeating import ALL_ALIKE, BEGINS, EACH, best_lags_m, comb_frequency, each_run, in_run, of_run
 from logger.vehicle.effect import Chosen, Parameter, Scale, chosen
 
@@ -23,9 +23,6 @@ def dip(p, seen):
     away_m = (seen.distance_m - place_m + 0.5 * turn_m) % turn_m - 0.5 * turn_m
     inside = np.abs(away_m) < 0.5 * p.length_m
     return inside * 0.5 * p.force_n * (1.0 + np.cos(2 * np.pi * away_m / p.length_m))
-"""
-_METHOD = """def laws(self, p, laws):
-    return laws.with_law(Between.WHEEL_AND_GROUND, dip, p)
 """
 _RADII_M = (0.25, 0.45)  # of the tires of cars and vans, less than twice apart, so that no multiple is taken for a turn
 _LENGTH_M = 0.2  # that of a contact patch
@@ -82,8 +79,8 @@ def _draft(context: LawContext, axle: str, runs: Sequence[str], radius_m: float,
         *(Parameter(name, place_m, -turn_m, turn_m, None, Scale.LINEAR, (place_m,),
                     f"along the road, where it is on the ground{of_run(run)}", step=0.005)
           for name, place_m, run in zip(names, places_m, runs, strict=True)))
-    draft = FAMILY.draft(parameters, _METHOD, _FUNCTIONS.format(place=places), variant="spot" + EACH * (last > 0),
-                         words=("needs_road = True",))
+    draft = FAMILY.draft(parameters, handed_on("dip", "WHEEL_AND_GROUND"), _FUNCTIONS.format(place=places),
+                         variant="spot" + EACH * (last > 0), words=("needs_road = True",))
     return draft.of_axle(axle) if axle else draft
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext
+from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, handed_on
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _FUNCTIONS = """
@@ -15,8 +15,6 @@ def rates(p, seen):
     held = 0.5 * np.abs(z) ** p.sharpness_ratio * (1.0 + np.sign(seen.rate_mps * z))
     return (seen.rate_mps / p.yield_travel_m * (1.0 - held),)
 """
-HANDED_ON = ("def laws(self, p, laws):\n"
-             "    return laws.with_law(Between.BODY_AND_WHEEL, force, p, rates, memory=(0.0,))")
 
 
 class FrictionWithMemory(Family):
@@ -35,7 +33,8 @@ class FrictionWithMemory(Family):
                       "over which it would come to that at its first stiffness"),
             Parameter("sharpness_ratio", 1.0, 1.0, 1.0, None, Scale.LINEAR, (1.0,),
                       "exponent of the law: the higher, the sharper the yield", default=1.0))
-        return [self.draft(parameters, HANDED_ON, _FUNCTIONS, title="friction that gives before it slides", at="loop")]
+        return [self.draft(parameters, handed_on(states=1), _FUNCTIONS, title="friction that gives before it slides",
+                           at="loop")]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         return f"friction with memory, {say('yield_force_n')} over {say('yield_travel_m', 1000.0, 'mm')}"

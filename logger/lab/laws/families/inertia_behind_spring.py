@@ -10,7 +10,7 @@ rigidly it is a mass that only the travel moves: the force is b x''.
 
 from __future__ import annotations
 
-from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
+from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, handed_on, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _FUNCTIONS = """
@@ -24,8 +24,6 @@ def rates(p, seen):
     lost_mps2 = 2 * p.damping_ratio * omega * moved_mps + p.square_per_m * moved_mps * np.abs(moved_mps)
     return (moved_mps, omega**2 * (seen.travel_m - moved_m) - lost_mps2)
 """
-_METHOD = ("def laws(self, p, laws):\n"
-           "    return laws.with_law(Between.BODY_AND_WHEEL, force, p, rates, memory=(0.0, 0.0))")
 _RIGID = """
 def structure(self, p, structure):
     return replace(structure, mass=structure.mass + p.inertance_kg * structure.travel.T @ structure.travel)
@@ -59,7 +57,7 @@ class InertiaBehindSpring(Family):
         return [self.draft((inertance,), _RIGID, kind="BodyEffect", variant="rigid",
                            title="inertia that moves with the suspensions' travel",
                            signature="the wheels hop at a lower frequency, and the body feels it"),
-                self.draft(sprung, _METHOD, _FUNCTIONS, title="inertia behind a spring in the suspensions",
+                self.draft(sprung, handed_on(states=2), _FUNCTIONS, title="inertia behind a spring in the suspensions",
                            variant="sprung", at="loop")]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:

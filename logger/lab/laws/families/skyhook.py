@@ -7,7 +7,7 @@ one can only resist its own rate v: it gives the smaller of C |z'| and B |v| whe
 
 from __future__ import annotations
 
-from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
+from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, handed_on, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 ACTIVE, SEMI_ACTIVE = "active", "semi-active"
@@ -19,9 +19,6 @@ _SEMI_ACTIVE = """
 def hooked(p, seen):
     resists = np.minimum(p.sky_n_s_per_m * np.abs(seen.body_mps), p.firmest_n_s_per_m * np.abs(seen.rate_mps))
     return np.where(seen.body_mps * seen.rate_mps > 0.0, np.sign(seen.rate_mps) * resists, 0.0)
-"""
-_METHOD = """def laws(self, p, laws):
-    return laws.with_law(Between.BODY_AND_WHEEL, hooked, p)
 """
 _TRIED, _MOST = (0.3, 1.0), 30.0  # of the damper's own damping
 
@@ -40,7 +37,7 @@ class Skyhook(Family):
                         "force by the speed of the body's end of the suspension")
         firmest = Parameter("firmest_n_s_per_m", tried[1], rounded(0.01 * own), most, None, Scale.LOG, tried,
                             "force by the suspension's rate, at most")
-        return [self.draft(parameters, _METHOD, functions, title=f"{variant} {self.title}", variant=variant)
+        return [self.draft(parameters, handed_on("hooked"), functions, title=f"{variant} {self.title}", variant=variant)
                 for variant, parameters, functions in ((ACTIVE, (sky,), _ACTIVE),
                                                        (SEMI_ACTIVE, (sky, firmest), _SEMI_ACTIVE))]
 

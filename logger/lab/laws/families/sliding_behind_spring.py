@@ -10,8 +10,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
-from logger.lab.laws.families.friction_with_memory import HANDED_ON
+from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, handed_on, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _FUNCTIONS = """
@@ -60,8 +59,8 @@ class SlidingBehindSpring(Family):
                       "either way, within which it has no force"))
         one_way = replace(ratio, low=1.0, high=1.0, default=1.0)
         tight = replace(play, start=0.0, high=0.0, trials=(0.0,), default=0.0)
-        return [self.draft((force, over, power, rate, *more), HANDED_ON, _FUNCTIONS, variant=variant, at="loop",
-                           title="a part slides behind a spring")
+        return [self.draft((force, over, power, rate, *more), handed_on(states=1), _FUNCTIONS, variant=variant,
+                           at="loop", title="a part slides behind a spring")
                 for variant, more in (("alike", (one_way, tight)), ("by direction", (ratio, tight)),
                                       ("with play", (one_way, play)))]
 

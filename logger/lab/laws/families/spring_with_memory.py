@@ -3,8 +3,7 @@ branch)."""
 
 from __future__ import annotations
 
-from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
-from logger.lab.laws.families.friction_with_memory import HANDED_ON
+from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, handed_on, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _FUNCTIONS = """
@@ -32,8 +31,8 @@ class SpringWithMemory(Family):
                       "of the rubber where it has no time to creep"),
             Parameter("creep_time_s", 0.1, 0.005, 5.0, None, Scale.LOG, (0.02, 0.07, 0.25),
                       "in which its force falls to 37 %"))
-        return [self.draft(parameters, HANDED_ON, _FUNCTIONS, title="rubber parallel to the springs that creeps",
-                           at="loop")]
+        return [self.draft(parameters, handed_on(states=1), _FUNCTIONS, at="loop",
+                           title="rubber parallel to the springs that creeps")]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         return (f"a spring with memory, {say('stiffness_n_per_m', 0.001, 'N/mm')} that creeps within "
