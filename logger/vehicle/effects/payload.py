@@ -1,9 +1,13 @@
 """More on the springs than the model says: luggage, fuel, people on firm seats. It lies at the centre of gravity.
 
-In a half car it is the load of one side, as all its masses are: half of what the car carries.
+In a half car it is the load of one side, as all its masses are: half of what the car carries. Of a part on its bench
+it is what hangs between the load cell and the part, and the fluid that it sets in motion: a force in phase with the
+acceleration.
 """
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 from logger.vehicle.effect import Parameter, Scale, Values, VehicleEffect
 from logger.vehicle.vehicle import Vehicle, with_load
@@ -24,4 +28,16 @@ class Payload(VehicleEffect):
         return with_load(vehicle, p.mass_kg)
 
 
+class _OfPart(Payload):
+    title = "a mass that is moved with the part: its fixture, the load cell's own, or fluid"
+    parameters = (replace(Payload.parameters[0], meaning="of what moves with the part"),)
+    signature = "a force in phase with the acceleration, which grows with the square of the frequency"
+    shown_by = "move it at higher frequencies, or the fixture alone"
+    needs_body = False
+
+    def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:
+        return "its mass is a number of its file" if vehicle.sprung_mass_kg else None
+
+
 EFFECT = Payload()
+EFFECT.variants = {"component": _OfPart()}
