@@ -66,11 +66,6 @@ class Signal:
         return _UNITS[self.measures]
 
     @property
-    def has_zero(self) -> bool:
-        """Whether what it reads at rest is known: of places it is not."""
-        return self.measures not in ("displacement", "travel")
-
-    @property
     def may_drift(self) -> bool:
         """Whether its sensor's zero wanders by as much as what it measures where that is slow: of accelerations and
         turning rates it does."""
@@ -318,6 +313,13 @@ def are_on_rig(runs: Sequence[Run]) -> bool:
 def begins_freely(track: Track | Excitation | None) -> bool:
     """Whether the state in which a run begins is one of its unknowns: that of a rig which nothing drives."""
     return isinstance(track, Excitation) and track.is_still
+
+
+def zero_is_known(main: Signal, track: Track | Excitation | None) -> bool:
+    """Whether what a run's main signal reads at rest is known: of places it is not, nor on a rig of accelerations, as
+    the zero of their sensor has nothing to do with what stands on springs or is let go."""
+    on_rig = isinstance(track, Excitation) and main.measures == "acceleration"
+    return main.measures not in ("displacement", "travel") and not on_rig
 
 
 def unknown_past_s(track: Track | Excitation | None) -> float:

@@ -14,7 +14,7 @@ from logger.arrays import Array
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track, WheelTracks
 from logger.roads.obstacles import OBSTACLES
-from logger.runs import ACCELERATION, READING, SENSOR, Run, Signal
+from logger.runs import ACCELERATION, READING, SENSOR, Run, Signal, zero_is_known
 from logger.vehicle.compose import MOST_MPS2, Car, Response, bounded, fine_outputs, recorded, respond, stepper_of
 from logger.vehicle.models import structure_of
 from logger.vehicle.modes import modes, undamped_frequencies_hz, vibrating
@@ -35,9 +35,10 @@ def observed(car: Car, passage: Passage, outputs: Sequence[Output]) -> Array:
     return np.stack([passage.recorded(column, np.ones_like) for column in fine_outputs(car, passage, outputs)], axis=1)
 
 
-def recorded_signals(car: Car, passage: Passage, signals: tuple[Signal, ...], main: Signal = ACCELERATION) -> Array:
+def recorded_signals(car: Car, passage: Passage, signals: tuple[Signal, ...], main: Signal = ACCELERATION,
+                     has_zero: bool = True) -> Array:
     """What the recorder keeps of the sensor's acceleration, or what else is its main signal, and of other signals,
-    these and places without their means, one after the other ((1 + s) N,).
+    these and what has no known zero (``has_zero``) without their means, one after the other ((1 + s) N,).
 
     Problem: a wheel's accelerometer, a travel sensor, a gyroscope each show something else of the same motion, and a
     fit asks for all of them hundreds of times. Solution: a car is moved once, all signals are read off that motion, and
@@ -47,12 +48,12 @@ def recorded_signals(car: Car, passage: Passage, signals: tuple[Signal, ...], ma
     ValueError for a signal that this car does not have.
     """
     first = output_of(car, main) if main.name != SENSOR or car.structure.held else car.output
-    if not signals and main.name == SENSOR:
+    if not signals and main.name == SENSOR and has_zero:
         return recorded(car, passage)
     outputs = [first, *(output_of(car, one) for one in signals)]
     found = passage.recorded_of((car.body, main, signals), lambda: fine_outputs(car, passage, outputs), car.factor)
     found[0] = car.written(passage, found[0])
-    begins = 1 if main.has_zero else 0
+    begins = int(has_zero)
     found[begins:] -= found[begins:].mean(axis=1, keepdims=True)
     return found.ravel()
 
@@ -150,8 +151,7 @@ class SimulatedRuns:
             for step_s, forces in {(one.step_s, one.forces) for one in passages if steps}:
                 stepper_of(car, step_s, forces)  # made once, before both threads ask for it
         each: Iterable[Array] = (self._steppers.map if car.bends_laws else map)(
-            partial(_recorded, car), passages, [run.signals for run in self.runs],
-            [run.facts.main for run in self.runs])
+            partial(_recorded, car), passages, self.runs)
         return [run.in_band(one) for run, one in zip(self.runs, each, strict=True)]
 
     def respond(self, car: Car, distance_error_m: Sequence[Array] | None = None) -> list[Response]:
@@ -261,7 +261,7 @@ class _WeighedRecord:
 
     def of(self, car: Car, begun: Passage) -> Array:
         """What a car would have read in their place."""
-        joined = self._run.in_band(_recorded(car, begun, self._run.signals, self._run.facts.main))
+        joined = self._run.in_band(_recorded(car, begun, self._run))
         return self._weighed(joined.reshape(-1, self._run.count)[:, self._counted])
 
     def usual(self, columns: Array) -> Array:
@@ -278,9 +278,10 @@ class _WeighedRecord:
         return np.asarray((samples - samples.mean(axis=1, keepdims=True)) / self._sizes).ravel()
 
 
-def _recorded(car: Car, passage: Passage, signals: tuple[Signal, ...], main: Signal) -> Array:
+def _recorded(car: Car, passage: Passage, run: Run) -> Array:
+    main = run.facts.main
     with np.errstate(over="ignore", invalid="ignore"):
-        found = recorded_signals(car, passage, signals, main)
+        found = recorded_signals(car, passage, run.signals, main, zero_is_known(main, run.track))
     return np.clip(np.nan_to_num(found, nan=MOST_MPS2), -MOST_MPS2, MOST_MPS2)
 
 

@@ -352,6 +352,27 @@ def test_a_clock_that_loses_several_samples_in_a_row_is_refused_with_its_line(tm
         ridelog.compare(tmp_path / "part.yaml", [run])
 
 
+@pytest.mark.parametrize("damping", ["1500 +- 50%", pytest.param("unknown", marks=pytest.mark.slow)])
+def test_the_mass_of_a_fixture_is_told_from_an_early_force(damping: str, tmp_path: Path,
+                                                           capsys: pytest.CaptureFixture[str]) -> None:
+    """3 kg between the load cell and a damper; then, in the same file, a mass that nobody asks for."""
+    way = noise(8.0, 0.01, 6)
+    force_n = 1200.0 * way(TIME_S, 1) + 3.0 * way(TIME_S, 2) + 50.0
+    force_n += np.random.default_rng(1).normal(0.0, 2.0, len(force_n))
+    run = written(tmp_path / "run", {"force_n": force_n}, {"displacement_m": way(TIME_S)}, "source: me\n")
+    text = f"name: part\nmodel: component\nstiffness_n_per_m: 0 +- 2000\ndamping_n_s_per_m: {damping}\n"
+    (tmp_path / "part.yaml").write_text(f"{text}preload_n: unknown\n")
+    assert main(["diagnose", "--vehicle", str(tmp_path / "part.yaml"), str(run), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["verdict"] == ["payload"]
+    fixture = found["candidates"][0]
+    assert abs(fixture["parameters"]["mass_kg"] - 3.0) < 3 * fixture["standard_errors"]["mass_kg"] < 0.3
+    (tmp_path / "part.yaml").write_text(f"{text}mass_kg: 2 +- 50%\npreload_n: unknown\n")
+    with pytest.raises(BadInput, match=r"payload.*its mass is a number of its file"):
+        main(["add-effect", "payload", "--vehicle", str(tmp_path / "part.yaml"), "--out", str(tmp_path / "with.yaml"),
+              str(run)])
+
+
 def test_play_of_a_part_that_moves_by_some_gaps_is_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     way = noise(3.0, 0.003, 6)
     x_m = way(TIME_S)
@@ -593,6 +614,20 @@ def test_two_effects_are_added_together(tmp_path: Path, capsys: pytest.CaptureFi
     values = {one.effect.name: one.values for one in ridelog.read_vehicle(tmp_path / "with.yaml").effects}
     assert values["dry_friction"]["friction_force_n"] == pytest.approx(3.0, rel=0.02)
     assert values["damper_asymmetry"]["rebound_to_bump_ratio"] == pytest.approx(130 / 90, rel=0.01)
+
+
+def test_the_zeros_of_sensors_are_in_no_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    push, bench = noise(30.0, 8.0, 4), Bench(0.8, 2000.0, 6.0)
+    seen = bench.moved(NOTHING, push, NOTHING)
+    (tmp_path / "bench.yaml").write_text(bench.yaml)
+    errors = []
+    for zero in (0.0, 1.5):
+        run = written(tmp_path / f"zero-{zero:g}", {"accel_z_mps2": seen["accel_z_mps2"] + zero,
+                                                    "displacement_m": seen["displacement_m"] + 0.01 * zero},
+                      {"force_n": push(TIME_S)}, BODY)
+        assert main(["compare", "--vehicle", str(tmp_path / "bench.yaml"), "--json", "--anyway", str(run)]) == 0
+        errors.append(json.loads(capsys.readouterr().out)["error"])
+    assert errors[1] == pytest.approx(errors[0], rel=1e-3) and errors[1] < 0.01
 
 
 def test_another_unit_of_another_signal_is_said(tmp_path: Path) -> None:

@@ -59,7 +59,7 @@ from logger.left_out import LeftOut, left_out_json, left_out_paragraph
 from logger.profiles.track import Track
 from logger.report.quantities import known as known_number
 from logger.runs import Run as Record
-from logger.runs import runs_left_out, unknown_past_s
+from logger.runs import runs_left_out, unknown_past_s, zero_is_known
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats import vehicle_file
 from logger.store.formats.drive_file import DRIVE, RUN
@@ -190,7 +190,8 @@ def _records(drives: Sequence[Run], question: IdentifyQuestion, vehicle: Vehicle
         if not lasts_s - LEAST_SAMPLES / drive.rate_hz > past_s:
             raise BadInput(f"{drive.path}: expected {LEAST_SAMPLES} samples or more after the first {past_s:g} s, "
                            f"which are left out, found a drive of {lasts_s:g} s")
-        samples = drive.accel_z_mps2 - (0.0 if drive.facts.main.has_zero else drive.accel_z_mps2.mean())
+        zero = 0.0 if zero_is_known(drive.facts.main, drive.track) else float(drive.accel_z_mps2.mean())
+        samples = drive.accel_z_mps2 - zero
         records.append(Record(str(drive.path), drive.rate_hz, samples, drive.distance_m, drive.speed_mps,
                               Track(1.0, np.zeros(2)) if drive.track is None else drive.track, past_s,
                               replace(drive.facts, signals=()), drive.marks()))

@@ -41,7 +41,19 @@ from logger.lab.selection.holdout import ROUNDING
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.roads.iri import likely_unit
-from logger.runs import CLIPPED, NO_READING, READING, SKIP_S, Array, Bools, Run, Signal, begins_freely, unknown_past_s
+from logger.runs import (
+    CLIPPED,
+    NO_READING,
+    READING,
+    SKIP_S,
+    Array,
+    Bools,
+    Run,
+    Signal,
+    begins_freely,
+    unknown_past_s,
+    zero_is_known,
+)
 from logger.simulation.virtual_drive import SimulatedRuns, steps_hz
 from logger.store.formats.drive_file import DRIVE, RUN, Drive, DriveOnRoad
 from logger.store.formats.vehicle_file import CarModel
@@ -413,7 +425,7 @@ def driven_stretches(drive: DriveOnRoad) -> list[Run]:
     cut_s = (len(drive.time_s) - sum(part.stop - part.start for part in parts)) / drive.rate_hz
     def main(part: slice) -> Array:
         samples = drive.accel_z_mps2[part]
-        return samples if drive.facts.main.has_zero else samples - samples.mean()
+        return samples if zero_is_known(drive.facts.main, drive.track) else samples - samples.mean()
 
     return [Run(str(drive.path) if whole else
                 f"{drive.path} ({drive.time_s[part.start]:.0f} to {drive.time_s[part.stop - 1]:.0f} s)",
