@@ -120,7 +120,7 @@ class _Regression:
 
         coefficients, covariance, rank, freedom, power, rest = _fit(
             *(self._whitened(one) for one in (self.residual, self.nuisance, columns)))
-        if rank == 0 or not rest > 0:
+        if rank == 0 or freedom < 1 or not rest > 0:
             return coefficients, covariance, float("nan"), 0.0
         variance = rest / freedom
         p_value = float(f.sf((power - rest) / rank / variance, rank, freedom))
