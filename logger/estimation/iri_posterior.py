@@ -148,7 +148,7 @@ def window_iri(
     knowledge: SlopeKnowledge,
     log_level_std: float,
     length_m: float,
-    misplaced_m: float = 0.0,
+    misplaced_m: float,
 ) -> WindowIri:
     """IRI of the window whose estimated slopes are given from edge to edge.
 

@@ -334,8 +334,8 @@ class FollowedRoad:
             # The level goes with the roughness along the block: two that follow the same slope would overshoot.
             now = learnt(now, power, resolved, block.log_waves, seen_share, before)
         innovations, gain = exp(0.5 * above_common) * solution.innovations, exp(-above_common) * gain
-        self._roughness.learn(first, innovations, log_variance, gain, seen, ratio,
-                              learns and is_last and before is not None, free)
+        self._roughness.learn(first, innovations, log_variance, gain, seen, sharper=ratio, free=free,
+                              learns=learns and is_last and before is not None)
         found = self._roughness.at(first, block.count)
         level = COMMON_ROAD.log_level + float(seen @ found / seen.sum())
         self._spectrum = replace(now, log_level=level)

@@ -343,8 +343,8 @@ class RoadEstimator:
             block = self._driven(block)
             beyond = between(self._beyond, self._reads).reshape(-1, self._reads)
             linear = replace(samples, reading_mps2=samples.reading_mps2 - beyond)
-            solved = self._road.solved(block, linear, read, self._beyond, self._beyond_variance, _TURNS,
-                                       turn == turns - 1)
+            solved = self._road.solved(block, linear, read, beyond_mps2=self._beyond, turns=_TURNS,
+                                       beyond_variance=self._beyond_variance, is_last=turn == turns - 1)
             there, _ = self._road.level_at(round(block.start_m / self._spacing_m), block.count)
             noise_psd = reading_noise_psd(1 / float(np.mean(1 / solved.variance)), RATE_HZ, block.mean_speed_mps)
             resolved = resolved_share(block.car, block.mean_speed_mps, there, noise_psd)

@@ -420,7 +420,7 @@ def _biases_percent(mph: int, segments: Sequence[int], effort: Workload) -> Arra
     found = []
     for number in range(roads):
         segment, draw = segments[number % len(segments)], 1 + number // len(segments)
-        road, drive, _ = _drive(segment, draw)
+        road, drive, _ = _drive(segment, draw=draw)
         inside = road.elevation_m[round(-road.start_m / road.spacing_m):][: round(_LENGTH_M_F6_23 / road.spacing_m) + 1]
         found.append(mean_window_by_rms(drive, edges_m, LOW_PASS_HZ) / iri(inside, road.spacing_m))
     return 100 * (np.array(found) - 1)
