@@ -87,7 +87,7 @@ _PIPES = tuple(f"pipe_abort_{use}_{end}" for use in ("read", "write") for end in
 log = logging.getLogger(__name__)
 
 
-def open_i2c(number: int, register_step: int | None = 1) -> I2cBus:
+def open_i2c(number: int, register_step: int | None) -> I2cBus:
     """Bus ``/dev/i2c-<number>``, for chips whose registers' addresses are ``register_step`` apart.
 
     NotPresent when it is not there, may not be opened, or is behind an adapter that cannot do what it takes. One that

@@ -67,12 +67,10 @@ from logger.vehicle.uncertain import cars_off, not_known
 from logger.vehicle.vehicle import GENERIC
 
 
-def check_recorded_rate(dump: Path, sensor: Instrument, looked_at: int = 2000, slower: float = 1.5) -> None:
-    """Raise BadInput where the readings of a sensor that is read several times per sample came too seldom for that.
-
-    looked_at    so many events
-    slower       as many times as long between most readings is no busy bus, but another rate
-    """
+def check_recorded_rate(dump: Path, sensor: Instrument) -> None:
+    """Raise BadInput where the readings of a sensor that is read several times per sample came too seldom for that."""
+    looked_at = 2000  # events
+    slower = 1.5  # as many times as long between most readings is no busy bus, but another rate
     if sensor.oversample == 1:
         return
     with open_dump(dump) as reader:

@@ -143,9 +143,9 @@ def test_what_a_bus_raises_keeps_its_number(call: str, monkeypatch: pytest.Monke
             refuse(patched, Bus, call, fault)
             if call == "open":
                 with pytest.raises(NotPresent, match="/dev/i2c-1: "):
-                    open_i2c(1)
+                    open_i2c(1, 1)
                 continue
-            bus = open_i2c(1)
+            bus = open_i2c(1, 1)
             if call == "close":
                 bus.close()
                 continue
@@ -169,7 +169,7 @@ def test_a_bus_is_closed_whatever_its_chip_does_at_the_end(monkeypatch: pytest.M
     monkeypatch.setattr(smbus2, "SMBus", Bus)
     closed = Bus.closed
     machine = Machine(lambda: 0, lambda seconds: None)
-    source = ChipSource("chip", lambda: open_i2c(1), lambda bus: BadEnd(),  # type: ignore[arg-type, return-value]
+    source = ChipSource("chip", lambda: open_i2c(1, 1), lambda bus: BadEnd(),  # type: ignore[arg-type, return-value]
                         machine.now_us, Deadlines(1, machine.now_us, machine.sleep))
     source.open()
     with pytest.raises(Unforeseen, match="TypeError: torn away"), as_device_error():
@@ -202,7 +202,7 @@ def test_a_port_that_may_not_be_opened_says_who_forbids_it(
 def test_so_does_a_bus(number: int, words: str, monkeypatch: pytest.MonkeyPatch) -> None:
     refuse(monkeypatch, smbus2.SMBus, "open", PermissionError(number, os.strerror(number)))
     with pytest.raises(NotPresent, match=words):
-        open_i2c(1)
+        open_i2c(1, 1)
 
 
 def test_rights_that_an_open_port_refuses_are_not_those_of_opening_it(

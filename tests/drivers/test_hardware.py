@@ -129,7 +129,7 @@ def test_a_baud_rate_is_positive(terminal: Terminal, baud: int) -> None:
 
 def test_a_missing_bus_says_how_to_enable_it() -> None:
     with pytest.raises(NotPresent, match=r"/dev/i2c-9999: no such bus; enable I2C \(dtparam=i2c_arm=on"):
-        open_i2c(9999)
+        open_i2c(9999, 1)
 
 
 @pytest.mark.parametrize(("number", "words"), [
@@ -141,7 +141,7 @@ def test_a_bus_that_may_not_be_opened(number: int, words: str, monkeypatch: pyte
 
     monkeypatch.setattr(smbus2.SMBus, "open", refuse)
     with pytest.raises(NotPresent, match=words):
-        open_i2c(1)
+        open_i2c(1, 1)
 
 
 def test_serial_rights_are_explained(monkeypatch: pytest.MonkeyPatch, terminal: Terminal) -> None:
