@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -229,6 +229,12 @@ class Run:
         """Of which samples (n,) something was read."""
         return np.ones(self.count, bool) if self.usable is None else np.asarray(self.usable != NO_READING)
 
+    def cut(self, count: int) -> Run:
+        """Its first samples, of which more than the beginning has to be left."""
+        return replace(self, measured_mps2=self.measured_mps2[:count], distance_m=self.distance_m[:count],
+                       speed_mps=self.speed_mps[:count], more=self.more[:, :count],
+                       usable=None if self.usable is None else self.usable[:count])
+
     def residual(self, prediction: Array, measured_mps2: Array | None = None) -> Array:
         """Measured minus predicted (n,), or of more signals joined to it [m/s2]; with ``measured_mps2`` (n,), of these
         readings in place of the sensor's. It is 0 where nothing was read, and of a clipped reading what the prediction
@@ -298,6 +304,11 @@ class Run:
     def begins_freely(self) -> bool:
         """Whether the state in which it begins is one of its unknowns."""
         return begins_freely(self.track)
+
+    @property
+    def is_of_part(self) -> bool:
+        """Whether it is of a part that its bench moves."""
+        return isinstance(self.track, Excitation) and self.track.moves_part
 
     @property
     def at_rest(self) -> bool:

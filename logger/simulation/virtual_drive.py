@@ -130,7 +130,7 @@ class SimulatedRuns:
     def __init__(self, runs: Sequence[Run], fine_hz: float = FINE_RATE_HZ) -> None:
         self.runs, self.fine_hz = list(runs), fine_hz
         self._steppers = ThreadPoolExecutor(_STEPPERS)
-        self._passages: list[dict[tuple[float, bytes, WheelTracks], Passage]] = [{} for _ in self.runs]
+        self._passages: list[dict[tuple[float, bytes, WheelTracks, bool], Passage]] = [{} for _ in self.runs]
 
     def __len__(self) -> int:
         return len(self.runs)
@@ -161,16 +161,17 @@ class SimulatedRuns:
 
     def beginnings(self, car: Car, distance_error_m: Sequence[Array] | None = None, rough: bool = False
                    ) -> list[Beginning | None]:
-        """How the runs that begin freely begin with this car; None of the others."""
+        """How the runs begin with this car whose initial state nobody knows; None of the others."""
         with np.errstate(over="ignore", invalid="ignore"):
-            return [_beginning(car, passage, run) if run.begins_freely else None for run, passage in zip(
+            return [_beginning(car, passage, run) if _begins_unknown(car, run) else None for run, passage in zip(
                 self.runs, self._unbegun(car, distance_error_m, rough), strict=True)]
 
     def _passages_of(self, car: Car, distance_error_m: Sequence[Array] | None, rough: bool = False,
                      tracks: Sequence[WheelTracks] | None = None, near: Sequence[Beginning | None] | None = None
                      ) -> list[Passage]:
         passages = self._unbegun(car, distance_error_m, rough, tracks)
-        return [passage.begun_with(_beginning(car, passage, run, one).state) if run.begins_freely else passage
+        return [passage.begun_with(_beginning(car, passage, run, one).state) if _begins_unknown(car, run)
+                else passage
                 for run, passage, one in zip(self.runs, passages, near or [None] * len(passages), strict=True)]
 
     def _unbegun(self, car: Car, distance_error_m: Sequence[Array] | None, rough: bool,
@@ -181,19 +182,26 @@ class SimulatedRuns:
             distance = run.distance_m if distance_error_m is None else run.distance_m + distance_error_m[index]
             distance = car.driven(distance)
             track: WheelTracks = run.track if tracks is None else tracks[index]
-            key = fine_hz, distance.tobytes(), track
+            is_free = _begins_unknown(car, run)
+            key = fine_hz, distance.tobytes(), track, is_free
             passage = self._passages[index].get(key)  # another thread may put others in its place at any time
             if passage is None:
-                passage = Passage(track, run.rate_hz, distance, fine_hz, index, run.begins_freely)
+                passage = Passage(track, run.rate_hz, distance, fine_hz, index, is_free)
                 kept = [*self._passages[index].items()][-_KEPT_PASSAGES + 1 :]
                 self._passages[index] = dict(kept) | {key: passage}
             found.append(passage)
         return found
 
 
+def _begins_unknown(car: Car, run: Run) -> bool:
+    """Whether the initial state of a run matters: of what nothing drives, or of a part with a memory."""
+    return run.begins_freely or (run.is_of_part and car.memories > 0)
+
+
 @dataclass(frozen=True, eq=False)
 class Beginning:
-    """The state (2 n,) in which a run begins, and how what its signals record changes with it (m, 2 n)."""
+    """The state (2 n + k,) in which a run begins, as ``Passage.begins``, and how what its signals record changes with
+    it (m, 2 n + k)."""
 
     state: Array
     columns: Array
@@ -209,23 +217,35 @@ def _beginning(car: Car, passage: Passage, run: Run, near: Beginning | None = No
     from that of a car that hardly differs (``near``), where there is one.
 
     Problem: what is pulled and let go, or was struck before its record begins, is in a state that nobody wrote down,
-    and every number of the car that is tried has its own best one. Solution: the state is eliminated wherever the run
+    and so is a part with a memory, which came to its first sample from above or from below; every number of the car
+    that is tried has its own best one. Solution: the state is eliminated wherever the run
     is predicted (variable projection: G. Golub and V. Pereyra, SIAM J. Numer. Anal. 10, 1973). The records of a linear
     car are linear in it, so that one solution of least squares finds it; from there Gauss-Newton steps lead to that of
     a car whose laws are bent. Each signal counts by its own size, and its zero is free. What the record does not show
     of the state stays at rest.
     """
+    if car.structure.held:  # what it remembers is gone after one cycle
+        places = passage.under_wheels(car.structure)[0][: run.count * passage.steps, 0]
+        gone = np.searchsorted(np.cumsum(np.abs(np.diff(places))), 2 * np.ptp(places)) // passage.steps
+        run = run.cut(max(int(gone), 2 * run.first) + 2)
+        passage = passage.cut(run.count)
     weighed = _WeighedRecord(run)
     record, step, wanted, plain = weighed.of, weighed.step, weighed.measured, car.linear
     passage.under_wheels(passage.driven(car.structure))  # asked for once, for all states
-    if near is not None:
+    count = 2 * len(car.structure.mass) + car.memories
+    if near is not None and len(near.state) == count:
         left = wanted - record(car, passage.begun_with(near.state))
         return replace(near, state=near.state + step(near.columns, left))
-    still = record(plain, passage)
-    # Small, as records are clipped at what no sensor reads: 1 m is that of what is let go at 160 Hz.
-    small = passage.begun_in_each(_SMALL_STATE * np.eye(2 * len(car.structure.mass)))
-    columns = np.stack([record(plain, one) - still for one in small], axis=1) / _SMALL_STATE
-    usual, state = weighed.usual(columns), step(columns, wanted - still)
+    columns, state, usual = np.zeros((len(wanted), count)), np.zeros(count), np.ones(count)
+    moves = count - car.memories
+    if car.structure.held:
+        usual[:moves] = 0.0  # the bench moves it
+    else:
+        still = record(plain, passage)
+        # Small, as records are clipped at what no sensor reads: 1 m is that of what is let go at 160 Hz.
+        small = passage.begun_in_each(_SMALL_STATE * np.eye(moves))
+        columns[:, :moves] = np.stack([record(plain, one) - still for one in small], axis=1) / _SMALL_STATE
+        usual[:moves], state = weighed.usual(columns)[:moves], step(columns, wanted - still)
     if not car.bends_laws:
         return Beginning(state, columns)
     here = record(car, passage.begun_with(state))

@@ -32,7 +32,7 @@ from logger.vehicle.effect import (
 from logger.vehicle.laws import CornerLaws, linear
 from logger.vehicle.models import structure_of
 from logger.vehicle.simulate import Passage, smooth
-from logger.vehicle.stepping import Motion, Stepper, force_input
+from logger.vehicle.stepping import Motion, Stepper, begun, force_input
 from logger.vehicle.structure import (
     Forces,
     Output,
@@ -83,6 +83,11 @@ class Car:
     def rubs(self) -> bool:
         """Whether there is dry friction in it that decides how it moves: not in a part that its bench moves."""
         return not self.structure.held and any(one.rubs for one in self.laws)
+
+    @property
+    def memories(self) -> int:
+        """How many states its laws have."""
+        return sum(len(law.memory) for corner in self.laws for law in corner.motions)
 
     @property
     def linear(self) -> Car:
@@ -292,7 +297,7 @@ def in_blocks(structure: Structure, passage: Passage, observe: Array) -> Array:
     driving = np.hstack([mean, (around[2:] - around[:-2]) / 4])
     moves = driving.any(axis=0) & gain.any(axis=0)  # the base of a rig that a force drives is at rest
     return driven_outputs(transition, gain[:, moves], observe, driving[:, moves],
-                          structure.at_rest(inputs[0]) + passage.begins)
+                          begun(structure.at_rest(inputs[0]), passage.begins))
 
 
 @lru_cache(maxsize=16)

@@ -90,8 +90,9 @@ class Passage:
     ValueError unless there are two or more finite distances.
     """
 
-    begins: Array | float = 0.0
-    """By how much the state (2 n,) that it begins in differs from the one at rest."""
+    begins = np.empty(0)
+    """By how much the state (2 n,) that it begins in, then those of laws with a memory (k,), differ from rest; empty:
+    not at all."""
 
     def __init__(self, track: WheelTracks, rate_hz: float, distance_m: Array, fine_hz: float = FINE_RATE_HZ,
                  run: int = 0, is_free: bool = False) -> None:
@@ -119,6 +120,7 @@ class Passage:
         self._known: dict[tuple[Hashable, ...], tuple[Array, Array]] = {}
         self._bodies: dict[Hashable, Complex] = {}
         self._begun: dict[bytes, list[Passage]] = {}
+        self._cuts: dict[int, Passage] = {}
 
     @property
     def time_s(self) -> Array:
@@ -130,14 +132,21 @@ class Passage:
         """How fast the car is at the samples (N,) [m/s]."""
         return np.asarray(np.gradient(self.distance_m, 1 / self.rate_hz))
 
+    def cut(self, count: int) -> Passage:
+        """Its first samples."""
+        if (found := self._cuts.get(count)) is None:
+            found = self._cuts[count] = Passage(self.track, self.rate_hz, self.distance_m[:count], 1 / self.step_s,
+                                                self._way.run, self._mirrored > 0)
+        return found
+
     def begun_with(self, state: Array) -> Passage:
-        """The same passage begun in a state that differs by this (2 n,) from the one at rest."""
+        """The same passage begun in a state that differs by this (2 n + k,) from the one at rest, as ``begins``."""
         found = copy(self)
         found.begins, found._bodies, found._begun = state, {}, {}
         return found
 
     def begun_in_each(self, states: Array) -> list[Passage]:
-        """The passages begun in these states (m, 2 n), which keep the bodies that passed; those of the same again."""
+        """The passages begun in these states (m, 2 n + k), which keep the bodies that passed; the same ones again."""
         key = states.tobytes()
         if (found := self._begun.get(key)) is None:
             found = self._begun[key] = [self.begun_with(one) for one in states]

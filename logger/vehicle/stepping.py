@@ -48,6 +48,14 @@ class Motion:
     forces: Array
 
 
+AT_REST = np.empty(0)
+
+
+def begun(at_rest: Array, begins: Array) -> Array:
+    """States (k,) that differ from those at rest by the first of ``begins``; by nothing where it is empty."""
+    return at_rest + begins[: len(at_rest)] if len(begins) else at_rest
+
+
 def static_tire_loads_n(structure: Structure) -> Array:
     """What each tire carries at rest (w,) [N]."""
     if not structure.tires.any():
@@ -118,8 +126,9 @@ class Stepper:
             _tabulated(structure, laws, step_s), np.array(rubs).reshape(-1, 3),
             np.array([one.places for one in rubbing], dtype=np.int64).reshape(-1, 3))
 
-    def march(self, elevation: Array, mean: Array, way: Way | None = None, begins: Array | float = 0.0) -> Motion:
-        """The motion on a road, from a state that differs by ``begins`` (2 n,) from rest.
+    def march(self, elevation: Array, mean: Array, way: Way | None = None, begins: Array = AT_REST) -> Motion:
+        """The motion on a road, from a state that differs by ``begins`` (2 n,) from rest, and so do those of laws with
+        a memory by what follows there (k,).
 
         elevation    (M, u) under the wheels at the instants [m], or of what inputs the structure has
         mean         (M - 1, u) over each step [m]
@@ -129,11 +138,11 @@ class Stepper:
 
         structure, n = self.structure, len(self.structure.mass)
         around = np.concatenate([2 * elevation[:1] - mean[:1], mean, 2 * elevation[-1:] - mean[-1:]])
-        first = structure.at_rest(elevation[0]) + begins
+        first = begun(structure.at_rest(elevation[0]), begins)
         stands = Way(np.zeros(len(elevation)), np.arange(0.0, len(elevation)) * self.step_s)
         return Motion(*steps(
             self.by_known, self.by_force, self.step_s, *self.tabulated, self.rubs, self.rubs_at,
-            _asked(structure, self.laws, way or stands),
+            _asked(structure, self.laws, way or stands, begins[2 * n:]),
             self.state_and_seen @ first + self.inputs_seen @ elevation[0], 2 * n, around, elevation))
 
 
@@ -177,8 +186,9 @@ def _looked_at(one: _Rubs, ease: float) -> float:
     return _GROWS_AT + (_RUBS_AT - _GROWS_AT) * sudden
 
 
-def _asked(structure: Structure, laws: Sequence[CornerLaws], way: Way) -> Asked:
-    """Laws by all that moves as the loop reads them; where there are none it asks for no place and no time."""
+def _asked(structure: Structure, laws: Sequence[CornerLaws], way: Way, begins: Array) -> Asked:
+    """Laws by all that moves as the loop reads them, their states (k,) begun so far from rest; where there are none it
+    asks for no place and no time."""
     from logger.vehicle.stepping_loop import ANSWERS, FELT, address_of, numbers_in_order
 
     whole, numbers, memories = list[list[int]](), [0.0], list[list[float]]()
@@ -191,9 +201,11 @@ def _asked(structure: Structure, laws: Sequence[CornerLaws], way: Way) -> Asked:
     if whole:
         places[:] = way.distance_m[:, None] - structure.behind_m
         clock.T[:] = way.time_s, np.gradient(way.distance_m, way.time_s), np.full(len(way.time_s), way.run)
-    return (np.array(whole, dtype=np.int64).reshape(-1, 5), np.array(numbers, float), np.zeros((len(whole), FELT)),
-            np.array(memories, float).reshape(-1, MOST_MEMORY), np.zeros(FELT), np.zeros(FELT + MOST_MEMORY),
-            np.zeros(ANSWERS), places, clock)
+    law, states = np.array(whole, dtype=np.int64).reshape(-1, 5), np.array(memories, float).reshape(-1, MOST_MEMORY)
+    own = np.arange(MOST_MEMORY) < law[:, -1:]
+    states[own] = begun(states[own], begins)
+    return (law, np.array(numbers, float), np.zeros((len(whole), FELT)), states, np.zeros(FELT),
+            np.zeros(FELT + MOST_MEMORY), np.zeros(ANSWERS), places, clock)
 
 
 def _tabulated(

@@ -396,22 +396,29 @@ def _begin(motion: Array, m: int, w: int, asked: Asked, road: Array, k: int) -> 
 
 
 @_compiled
+def _push(forces: Array, w: int, law: Whole, one: int, given: Array, felt: Array, answers: Array) -> None:
+    """Add the force of a law that feels this."""
+    i, between = law[one, WHEEL], law[one, BETWEEN]
+    ask(law[one, ADDRESS], given, law[one, FIRST], felt, answers)
+    # What pulls the body's end down is a pull between body and wheel and one on the wheel alone.
+    if between != WHEEL_AND_GROUND:
+        forces[i] += answers[0]
+    if between != BODY_AND_WHEEL:
+        forces[w + i] += answers[0]
+
+
+@_compiled
 def _answer(forces: Array, motion: Array, m: int, w: int, asked: Asked, road: Array, k: int, step_s: float) -> None:
     """Add the forces of laws by all that moves at the end of step k, and step their states."""
     law, given, began, memories, felt, middle, answers, places, clock = asked
     for one in range(len(law)):
-        i, between = law[one, WHEEL], law[one, BETWEEN]
+        i = law[one, WHEEL]
         _feel(felt, motion, m, w, i, road, places[k + 1, i], clock[k + 1])
         if law[one, STATES]:
             _remember(law, one, given, began, memories, felt, middle, answers, step_s)
             for c in range(law[one, STATES]):
                 felt[MEMORY_AT + c] = memories[one, c]
-        ask(law[one, ADDRESS], given, law[one, FIRST], felt, answers)
-        # What pulls the body's end down is a pull between body and wheel and one on the wheel alone.
-        if between != WHEEL_AND_GROUND:
-            forces[i] += answers[0]
-        if between != BODY_AND_WHEEL:
-            forces[w + i] += answers[0]
+        _push(forces, w, law, one, given, felt, answers)
 
 
 @_compiled
@@ -521,6 +528,10 @@ def steps(
         for i in range(w):
             begun[i] = _suspension(i, tables, pairs, numbers, start[m + i], start[m + w + i], mounts, 0.0)
             begun[w + i] = _tire(i, tables, numbers, start[m + 2 * w + i] - road[i], start[m + 3 * w + i] - road[w + i])
+        law, given, began, _, _, _, answers, _, _ = asked
+        _begin(start, m, w, asked, road, 0)
+        for one in range(len(law)):
+            _push(begun, w, law, one, given, began[one], answers)
         known[m : m + 2 * w] = begun
         recorded[0] = begun
     _walk(by_known, by_force, step_s, tables, pairs, numbers, around, elevation, states, recorded, known, before,

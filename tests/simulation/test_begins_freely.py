@@ -70,3 +70,25 @@ def test_a_wrong_car_begins_where_squares_are_least() -> None:
                         np.ones(len(TIME_S))], axis=1)
     expected = columns @ np.linalg.lstsq(columns, samples)[0]
     assert found == pytest.approx(expected - expected.mean(), abs=2e-3 * samples.std())
+
+
+@pytest.mark.parametrize("first", [0, 37, 63, 110])
+def test_a_part_with_a_memory_is_cut_out_of_its_motion_anywhere(first: int) -> None:
+    """Bouc and Wen's law on a bench that has been running for a while, or that has just begun to."""
+    rate_hz, time_s = 250.0, np.arange(700) / 250.0
+    place_m, rate_mps = 0.004 * np.sin(8 * time_s), 0.032 * np.cos(8 * time_s)
+
+    def grows(t: float, z: Array) -> Array:
+        v = 0.032 * np.cos(8 * t)
+        return np.asarray(v / 8e-4 * (1 - 0.5 * np.abs(z) ** 0.8 * (1 + np.sign(v * z))))
+
+    z = solve_ivp(grows, (0, time_s[-1]), [0.0], t_eval=time_s, rtol=1e-9, atol=1e-11, max_step=1e-3).y[0]
+    force_n = (1500 * place_m + 900 * rate_mps + 600 * z)[first:]
+    nothing = np.zeros((2, len(force_n)))
+    run = Run("part", rate_hz, force_n, *nothing, Excitation(rate_hz, place_m[first:], moves_part=True), 0.0,
+              RecordFacts(main=Signal("force_n", "force", "front_suspension")))
+    part = Vehicle("part", "component", 0.0, None, Axle(0.0, 0.0, 1500.0, 900.0, 0.0), None, 0.0)
+    memory = Chosen(shipped_effects()["hysteresis"], {
+        "yield_force_n": 600.0, "yield_travel_m": 8e-4, "sharpness_ratio": 0.8, "axle": 0.0})
+    (found,) = SimulatedRuns([run]).predict(compose(part, (memory,)))
+    assert np.abs(found - force_n)[5:-5].max() < 0.01 * np.abs(force_n).max()
