@@ -26,7 +26,7 @@ from logger.lab.selection.candidate_fit import CandidateFit
 from logger.lab.selection.screening import Baseline, Screened, misalignment
 from logger.lab.selection.stepwise import Search
 from logger.runs import Run, normalised_rms_error
-from logger.simulation.virtual_drive import SimulatedRuns
+from logger.simulation.virtual_drive import SEARCH_HZ, SimulatedRuns
 from logger.vehicle.effect import Chosen, Effect, ForceEffect
 from logger.vehicle.effects.sensor_gain import EFFECT as SENSOR_GAIN
 from logger.vehicle.stepping_loop import COMPILED
@@ -63,7 +63,7 @@ def another_car(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen]
     anything = Tolerance(numbers=0.5, lengths=0.1)  # cars from a small one to a van
     if numbers >= anything.numbers or normalised_rms_error(runs, predictions) < POOR_ERROR:
         return None
-    some = SimulatedRuns([_first_part(one) for one in dict.fromkeys((runs[0], runs[-1]))], fine_hz=500.0)
+    some = SimulatedRuns([_first_part(one) for one in dict.fromkeys((runs[0], runs[-1]))], SEARCH_HZ)
     wide = Posterior(some, vehicle, anything, vehicle)
     error = wide.error(align(wide, wide.start(effects)).state)
     if error < POOR_ERROR:

@@ -35,7 +35,7 @@ from logger.lab.selection.screening import misalignment, screen
 from logger.profiles.excitation import Excitation
 from logger.runs import Array, Run, are_on_rig
 from logger.shipped import vehicle_path
-from logger.simulation.virtual_drive import SimulatedRuns
+from logger.simulation.virtual_drive import SEARCH_HZ, SimulatedRuns
 from logger.store.formats import drive_file, effect_file
 from logger.store.formats.effect_file import check_on, effect_named, own_effect
 from logger.store.formats.vehicle_file import CarModel, ModelStep
@@ -45,7 +45,7 @@ from logger.vehicle.uncertain import Known, Scales, sized
 from logger.vehicle.vehicle import OWN_NAMES
 
 _SLOW = "expect ten minutes or more for each minute driven"
-_SEARCH_HZ = 500.0  # a search needs no more steps a second than this; what is reported is computed with the usual ones
+
 
 @dataclass(frozen=True, eq=False)
 class Bench:
@@ -69,7 +69,7 @@ class Bench:
 
         Raises BadInput when the vehicle lacks what it needs.
         """
-        runs = SimulatedRuns(self.runs.runs, fine_hz=_SEARCH_HZ) if searches else self.runs
+        runs = SimulatedRuns(self.runs.runs, fine_hz=SEARCH_HZ) if searches else self.runs
         model = self.model
         return Posterior(runs, model.given or model.vehicle, self.tolerance, model.vehicle)
 

@@ -58,7 +58,7 @@ def _gauss_newton_trial(base: Baseline, draft: Draft, values: dict[str, float]) 
     last = len(effects) - 1
     strengths = [FreeParameter(last, place) for place, one in enumerate(draft.effect.parameters)
                  if one.name in draft.strengths]
-    slopes = effect_slopes(linear, effects, state.logs, strengths, state.record, base.rough, None)
+    slopes = effect_slopes(base.posterior, effects, state.logs, strengths, state.record, None)
     white, residuals = linear.whitened(slopes), linear.fit_record_errors(state.predictions).residuals
     gradient, information = linear.gradient(residuals, state.logs, white), linear.information(white)
     p = linear.count

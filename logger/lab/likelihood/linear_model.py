@@ -49,8 +49,9 @@ class _Record:
            here: Array) -> _Record:
         """With derivatives (k, n), at a residual (n,) and the numbers (k,)."""
         white = np.empty((error.count, whitener.kept))
-        for part in np.array_split(np.arange(error.count), isqrt(error.count)):  # a spectrum of all would be large
-            white[part] = whitener(slopes[part].toarray())
+        some = isqrt(error.count)
+        for first in range(0, error.count, some):  # a spectrum of all would be large
+            white[first : first + some] = whitener(slopes[first : first + some].toarray())
         return _Record(error, slopes, whitener, white @ white.T, white @ whitener(residual), here)
 
     def projected(self, white: Array) -> Array:
@@ -232,13 +233,7 @@ class LinearModel:
 
     def whitened(self, columns: Sequence[Array]) -> list[Array]:
         """Derivatives in each run, (n,) or (m, n) to (..., kept)."""
-        sensitive = self.without_insensitive_samples(columns)
-        return [whitener(one) for whitener, one in zip(self.whiteners, sensitive, strict=True)]
-
-    def without_insensitive_samples(self, columns: Sequence[Array]) -> list[Array]:
-        """Derivatives in each run, (n,) or (m, n), zero where its readings would not change."""
-        return [readings.without_insensitive_samples(one, prediction) for readings, one, prediction in zip(
-            self.posterior.readings, columns, self._predictions, strict=True)]
+        return whitened(self.posterior, self.whiteners, columns, self._predictions)
 
     def fit_record_errors(self, predictions: Sequence[Array],
                           record: Sequence[Array] | None = None) -> RecordErrorFit:
@@ -267,7 +262,7 @@ class LinearModel:
         """Derivatives (m, n) per run less what the record's errors absorb of them, as far as the readings show."""
         from scipy.linalg import cho_solve
 
-        seen = self.without_insensitive_samples(columns)
+        seen = self.posterior.without_insensitive_samples(columns, self._predictions)
         return [one - (record.slopes.T @ cho_solve((root, True), record.projected(whitener(one)))).T
                 for one, record, root, whitener in zip(seen, self._records, self._roots, self.whiteners, strict=True)]
 
@@ -309,6 +304,13 @@ class LinearModel:
             self.white, self._record_projections, columns, own_projections, strict=True)), np.zeros(self.count))
         return mixed, sum(float(one @ one) - float((mine**2).sum())
                           for one, mine in zip(own, own_projections, strict=True))
+
+
+def whitened(posterior: Posterior, whiteners: Sequence[JointWhitener], columns: Sequence[Array],
+             predictions: Sequence[Array]) -> list[Array]:
+    """Derivatives of such predictions in each run, (n,) or (m, n) to (..., kept)."""
+    sensitive = posterior.without_insensitive_samples(columns, predictions)
+    return [whitener(one) for whitener, one in zip(whiteners, sensitive, strict=True)]
 
 
 def _coordinate_descent(minus_twice_log_evidence: Callable[[Array], float], here: Array

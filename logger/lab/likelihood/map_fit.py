@@ -18,9 +18,10 @@ import numpy as np
 from logger.arrays import Array
 from logger.fitting.levenberg_marquardt import Damping, minimise
 from logger.lab.likelihood.lag import RESOLVED_M, offset_by_correlation_m, offset_by_lag_m
-from logger.lab.likelihood.linear_model import LinearModel, RecordErrorFit
+from logger.lab.likelihood.linear_model import LinearModel, RecordErrorFit, whitened
 from logger.lab.likelihood.posterior import NotSimulated, Posterior, State, derivatives
 from logger.lab.likelihood.priors import CONFLICT_SIGMA
+from logger.lab.likelihood.signals import JointWhitener
 from logger.profiles.track import Track
 from logger.vehicle.effect import Chosen, Parameter
 from logger.vehicle.named_parameters import (
@@ -65,11 +66,9 @@ class MapFit:
         """The fitted model that a linear model was linearised at."""
         return MapFit(linear.posterior, linear.state, list(linear.numbers or ()), linear.score)
 
-    def linearise(self, keep_size: bool = False) -> LinearModel:
-        """The model linearised again at its state; ``keep_size``: with distance errors of the size found before."""
-        residuals = self.posterior.residuals(self.state)
-        whiteners = [one.whitener(residual) for one, residual in zip(self.posterior.bands, residuals, strict=True)]
-        return LinearModel(self.posterior, self.state, self.numbers, whiteners if keep_size else None)
+    def linearise(self) -> LinearModel:
+        """The model linearised again at its state."""
+        return LinearModel(self.posterior, self.state, self.numbers)
 
 
 def fit(start: LinearModel, numbers: Sequence[Array] | None = None, rounds: int = 6, min_gain: float = 0.0,
@@ -248,7 +247,7 @@ def optimise_numbers(linear: LinearModel, state: State, free_parameters: Sequenc
     def normal_equations(x: Array, at: _Point, fresh: bool) -> tuple[Array, Array]:
         nonlocal own, known, here
         if free_parameters and fresh:
-            slopes = effect_slopes(linear, at.effects, at.logs, free_parameters, at.record, at.predictions, own)
+            slopes = effect_slopes(linear.posterior, at.effects, at.logs, free_parameters, at.record, own)
             known = x.copy(), at, slopes
             if linear.prior.is_vague:
                 here, freed = without_common_scale(linear, at.effects, slopes)
@@ -286,36 +285,35 @@ def range_of(parameter: Parameter) -> float:
     return high - low
 
 
-def effect_slopes(linear: LinearModel, effects: Sequence[Chosen], logs: Array, free_parameters: Sequence[FreeParameter],
-                  record: Sequence[Array], fine: Sequence[Array], white: Sequence[Array] | None) -> list[Array]:
+def effect_slopes(posterior: Posterior, effects: Sequence[Chosen], logs: Array,
+                  free_parameters: Sequence[FreeParameter], record: Sequence[Array], white: Sequence[Array] | None
+                  ) -> list[Array]:
     """Derivatives of predictions by the effects' numbers, on the scales of the parameters: (m, n) per run, with these
     record errors, by differences of rough simulations, which are near enough.
 
-    fine     known predictions (n,) per run; a car without dry friction needs no rough ones
     white    such derivatives taken nearby, whitened (m, kept) per run, by which steps are ``_fine``: a stop of which
              the place is a hundredth of a millimetre off changes all that comes after a blow, and not in proportion.
              None: they are not known
     """
-    posterior, car = linear.posterior, linear.posterior.car(effects, logs)
+    car = posterior.car(effects, logs)
     near = posterior.runs.beginnings(car, posterior.distance_error_m(record), rough=True)
     predict = partial(posterior.predict, logs=logs, record=record, rough=True, near=near)
-    before = predict(effects) if car.rubs or any(near) else fine
     steps = steps_of(effects, free_parameters)
     if white is not None:
         steps = _fine(steps, sum((one**2).sum(axis=1) for one in white))
     return derivatives(lambda there: predict(with_coordinates(effects, free_parameters, there)),
-                       coordinates_of(effects, free_parameters), steps, before)
+                       coordinates_of(effects, free_parameters), steps, predict(effects))
 
 
-def own_slopes(linear: LinearModel) -> list[Array] | None:
-    """Derivatives of a model's predictions by the numbers of its effects: (m, n) per run; None where none is free."""
-    state = linear.state
+def own_slopes(posterior: Posterior, state: State, whiteners: Sequence[JointWhitener]) -> list[Array] | None:
+    """Derivatives of a state's predictions by the numbers of its effects: (m, n) per run; None where none is free."""
     free_parameters = free_parameters_of(state.effects)
     if not free_parameters:
         return None
-    slopes, given = None, (state.effects, state.logs, free_parameters, state.record, state.predictions)
+    slopes, given = None, (state.effects, state.logs, free_parameters, state.record)
     for _ in range(2):
-        slopes = effect_slopes(linear, *given, None if slopes is None else linear.whitened(slopes))
+        slopes = effect_slopes(posterior, *given, None if slopes is None else whitened(
+            posterior, whiteners, slopes, state.predictions))
     return slopes
 
 

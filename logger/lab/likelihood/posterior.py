@@ -126,8 +126,6 @@ class Posterior:
         """A function that predicts models near a state: by rough simulations, corrected by the difference of a fine and
         a rough one of the state itself."""
         given = state.effects, state.logs, state.record
-        if not self.car(state.effects, state.logs).rubs:
-            return self.predict
         fine = state.predictions or self.predict(*given)
         off = [one - rough for one, rough in zip(fine, self.predict(*given, rough=True), strict=True)]
 
@@ -153,6 +151,11 @@ class Posterior:
     def residuals_of(self, predictions: Sequence[Array]) -> list[Array]:
         """Readings minus predictions (n,), per run."""
         return [one.residual(prediction) for one, prediction in zip(self.readings, predictions, strict=True)]
+
+    def without_insensitive_samples(self, columns: Sequence[Array], predictions: Sequence[Array]) -> list[Array]:
+        """Derivatives of predictions in each run, (n,) or (m, n), zero where its readings would not change."""
+        return [readings.without_insensitive_samples(one, prediction) for readings, one, prediction in zip(
+            self.readings, columns, predictions, strict=True)]
 
     def carried_noise(self, state: State, draw: int) -> list[Array]:
         """Changes (n,) of the predictions, per run, by noise like what is still in the measured input of a rig, signals

@@ -97,7 +97,8 @@ def _covariance(linear: LinearModel) -> Array:
     free = linear.posterior.with_free_gains()
     if free is not linear.posterior:  # what a sensor may be off by, all that it scales is
         linear = LinearModel(free, linear.state, linear.numbers, linear.whiteners)
-    linear, slopes = without_common_scale(linear, linear.state.effects, own_slopes(linear))
+    linear, slopes = without_common_scale(linear, linear.state.effects, own_slopes(
+        linear.posterior, linear.state, linear.whiteners))
     information = linear.information(None if slopes is None else linear.whitened(slopes))
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
     known = size > 0

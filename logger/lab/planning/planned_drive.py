@@ -27,15 +27,20 @@ from logger.lab.likelihood.whittle import Whitener
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.runs import RecordFacts, Run, Signal
-from logger.simulation.virtual_drive import Obstacle, SimulatedRuns, at_one_speed, motion_along, with_obstacles
+from logger.simulation.virtual_drive import (
+    SEARCH_HZ,
+    Obstacle,
+    SimulatedRuns,
+    at_one_speed,
+    motion_along,
+    with_obstacles,
+)
 from logger.units import STANDARD_GRAVITY_MPS2
 from logger.vehicle.effect import Chosen
 from logger.vehicle.models import structure_of
 from logger.vehicle.vehicle import Vehicle
 
 RATE_HZ = 100.0
-SEARCH_HZ = 500.0
-"""Simulation steps a second, which are enough for the change by an effect."""
 SIGNAL_NOISE = {"travel": 0.0005, "pitch_rate": 0.001, "roll_rate": 0.001}
 """R.m.s. noise of a second sensor that is no accelerometer: a string or rotary potentiometer of 0.25 m with a linearity
 of 0.2 %; a MEMS gyroscope's 0.05 deg/s (InvenSense, MPU-6000 product specification, 6.1) [m, rad/s]."""

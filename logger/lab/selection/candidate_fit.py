@@ -49,7 +49,7 @@ class CandidateFit:
     @cached_property
     def hold_out(self) -> HoldOut:
         """Cross-validation of the model."""
-        return cross_validate(self.found.linearise(keep_size=True))
+        return cross_validate(self.found)
 
 
 def chance_of(effects: Sequence[Chosen], gain: float, freedom: float, candidates: int) -> float:

@@ -19,7 +19,7 @@ import numpy.typing as npt
 
 from logger.arrays import Array
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import own_slopes
+from logger.lab.likelihood.map_fit import MapFit, own_slopes
 from logger.lab.likelihood.readings import error_with_rounding_noise
 from logger.lab.likelihood.signals import deviance
 from logger.runs import Run
@@ -57,22 +57,24 @@ def folds(run: Run) -> npt.NDArray[np.intp]:
     return np.tile((time_s / stretch_s).astype(np.intp) % _FOLDS, 1 + len(run.signals))
 
 
-def cross_validate(linear: LinearModel, own: Sequence[Array] | None = None) -> HoldOut:
-    """Cross-validate a linearised model, with columns (m, n) per run whose coefficients are fitted too; None: those of
-    its effects' numbers."""
-    posterior, state = linear.posterior, linear.state
-    own = own_slopes(linear) if own is None else own
+def cross_validate(fitted: LinearModel | MapFit, own: Sequence[Array] | None = None) -> HoldOut:
+    """Cross-validate a fitted model, with columns (m, n) per run whose coefficients are fitted too; None: those of its
+    effects' numbers."""
+    posterior, state = fitted.posterior, fitted.state
     residuals = posterior.residuals(state)
-    columns = linear.numbers or [np.empty((0, len(one))) for one in residuals]
+    whiteners = [one.whitener(residual) for one, residual in zip(posterior.bands, residuals, strict=True)]
+    own = own_slopes(posterior, state, whiteners) if own is None else own
+    columns = fitted.numbers or [np.empty((0, len(one))) for one in residuals]
+    count = len(columns[0])
     if own is not None:
         columns = [np.vstack([first, more]) for first, more in zip(columns, own, strict=True)]
-    columns = linear.without_insensitive_samples(columns)
-    white, ones = ([whitener.in_time(one) for whitener, one in zip(linear.whiteners, some, strict=True)]
+    columns = posterior.without_insensitive_samples(columns, state.predictions)
+    white, ones = ([whitener.in_time(one) for whitener, one in zip(whiteners, some, strict=True)]
                    for some in (columns, residuals))
     sets = [folds(run) for run in posterior.runs.runs]
-    own_count = len(columns[0]) - linear.count
-    prior = np.concatenate([posterior.prior.precision[: linear.count], np.zeros(own_count)])
-    prior_gradient = np.concatenate([posterior.prior.gradient(state.logs)[: linear.count], np.zeros(own_count)])
+    own_count = len(columns[0]) - count
+    prior = np.concatenate([posterior.prior.precision[:count], np.zeros(own_count)])
+    prior_gradient = np.concatenate([posterior.prior.gradient(state.logs)[:count], np.zeros(own_count)])
     unseen = [one.copy() for one in residuals]
     everything = sum(np.einsum("ij,ij->i", part, part) for part in white)
     for fold in range(_FOLDS):

@@ -83,7 +83,8 @@ class Baseline:
         """The baseline of a linearised model."""
         state = linear.state
         return Baseline(linear.score, gain_of_full_explanation(linear.posterior, state),
-                        _rough_predictions(linear, state.effects, state.logs), _Quadratic.of(linear), trend_removed)
+                        linear.posterior.predict(state.effects, state.logs, state.record, rough=True),
+                        _Quadratic.of(linear), trend_removed)
 
     @property
     def posterior(self) -> Posterior:
@@ -282,16 +283,17 @@ def _optima(trials: Sequence[Trial]) -> list[Trial]:
     return sorted(found, key=lambda one: -one.gain)
 
 
-def _rough_predictions(linear: LinearModel, effects: Sequence[Chosen], logs: Array) -> list[Array]:
-    """Predictions (n,) per run of a rough simulation with the record errors of a linearised model."""
-    return linear.posterior.predict(effects, logs, linear.state.record, rough=True)
+def _change(base: Baseline, more: Sequence[Chosen], logs: Array) -> list[Array]:
+    """Change (n,) of the predictions, per run, by more effects and by the car's numbers."""
+    state = base.state
+    there = base.posterior.predict((*state.effects, *more), logs, state.record, rough=True)
+    return [new - old for new, old in zip(there, base.rough, strict=True)]
 
 
 def _trial_at_best_strength(base: Baseline, one: Chosen) -> Trial:
     """The trial at its best strength."""
     linear, quadratic = base.linear, base.quadratic
-    there = _rough_predictions(linear, (*base.state.effects, one), base.state.logs)
-    change = [new - old for new, old in zip(there, base.rough, strict=True)]
+    change = _change(base, [one], base.state.logs)
     white = linear.whitened(change)
     here = base.state.logs + quadratic.newton_step
     mixed, own = linear.cross_products(white)
@@ -328,9 +330,9 @@ def _goes_both_ways(effect: Effect) -> bool:
 def _with_predicted_gain(base: Baseline, trial: Trial) -> Trial:
     """The trial with the gain of a full prediction, the car's numbers to first order."""
     state, linear = base.state, base.linear
-    there = linear.posterior.predict((*state.effects, trial.one), state.logs, state.record)
-    step = trial.logs - state.logs
-    moved_there = [one + step @ columns for one, columns in zip(there, linear.numbers or (), strict=True)]
+    change, step = _change(base, [trial.one], state.logs), trial.logs - state.logs
+    moved_there = [fine + more + step @ columns for fine, more, columns in zip(
+        state.predictions, change, linear.numbers or (), strict=True)]
     return replace(trial, gain=base.quadratic.objective - linear.objective(moved_there, trial.logs))
 
 
@@ -342,11 +344,10 @@ def _trial_at_values(base: Baseline, one: Chosen, besides: tuple[Chosen, ...] = 
     """
     linear = base.linear.hold_fixed(one.effect.replaces)
     logs = np.where(np.isin(linear.prior.names, one.effect.replaces), 0.0, base.state.logs)
-    there = _rough_predictions(linear, (*base.state.effects, one, *besides), logs)
-    found = linear.fit_record_errors(there)
+    change = _change(base, (one, *besides), logs)
+    found = linear.fit_record_errors([fine + more for fine, more in zip(base.state.predictions, change, strict=True)])
     gradient = linear.gradient(found.residuals, logs)
     step = np.linalg.solve(linear.information(), gradient)
-    change = [new - old for new, old in zip(there, base.rough, strict=True)]
     objective = found.squares + linear.prior.cost(logs) - float(gradient @ step)
     return Trial(one, base.quadratic.objective - objective, logs + step, change)
 

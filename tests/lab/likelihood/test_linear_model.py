@@ -44,8 +44,7 @@ def case() -> Case:
     effects = (tire_damping(150.0), chosen(EFFECTS["sensor_gain"], {"gain": 1.02}))
     state = posterior.state_at(effects, logs, record)
     linear = LinearModel(posterior, state, posterior.number_slopes(state, posterior.prior.steps))
-    own = effect_slopes(linear, effects, logs, free_parameters_of(effects), linear.state.record, state.predictions,
-                        None)
+    own = effect_slopes(posterior, effects, logs, free_parameters_of(effects), linear.state.record, None)
     return Case(posterior, state, linear, linear.whitened(own))
 
 
@@ -109,8 +108,8 @@ def test_the_gradient_is_that_of_the_objective() -> None:
     one = case()
     assert one.linear.numbers is not None
     numbers, logs = one.linear.numbers, one.state.logs
-    own = effect_slopes(one.linear, one.state.effects, logs, free_parameters_of(one.state.effects), one.state.record,
-                        one.state.predictions, None)
+    own = effect_slopes(one.posterior, one.state.effects, logs, free_parameters_of(one.state.effects), one.state.record,
+                        None)
 
     def objective(x: Array) -> float:
         there = [each + x[: len(logs)] @ of_car + x[len(logs):] @ of_effects for each, of_car, of_effects in zip(

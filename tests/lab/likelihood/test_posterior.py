@@ -5,14 +5,16 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
+from logger.arrays import Array
 from logger.runs import RecordFacts
 from logger.simulation.virtual_drive import SimulatedRuns
 
 from ...support.lab.secret_runs import FINE_HZ, hidden, posterior_of, secret_runs
 
 
-def test_near_a_car_that_rubs_rough_simulations_are_corrected_by_what_they_lack_at_the_state() -> None:
+def test_near_a_state_rough_simulations_are_corrected_by_what_they_lack_there() -> None:
     rubbing = [hidden("dry_friction", friction_force_n=60.0)]
     posterior = posterior_of(secret_runs(rubbing, lasts_s=6.0))
     state = posterior.start(rubbing)
@@ -21,7 +23,22 @@ def test_near_a_car_that_rubs_rough_simulations_are_corrected_by_what_they_lack_
     for one, fine, roughly in zip(posterior.predictor(state)(*given), state.predictions, rough, strict=True):
         assert np.abs(fine - roughly).max() > 1e-3 * fine.std()  # there is something to correct
         np.testing.assert_allclose(one, fine, atol=1e-9)
-    assert posterior.predictor(posterior.start()) == posterior.predict
+
+
+@pytest.mark.parametrize(("effect", "values"), [
+    ("damper_asymmetry", {"rebound_to_bump_ratio": 2.0}), ("tire_damping", {"tire_damping_n_s_per_m": 300.0}),
+    ("top_mount_compliance", {}), ("progressive_spring", {"cubic_stiffness_n_per_m3": 3e6}), ("payload", {})])
+def test_what_an_effect_changes_is_nearly_right_in_half_as_many_steps(effect: str, values: dict[str, float]) -> None:
+    posterior = posterior_of(secret_runs(lasts_s=6.0))
+    state = posterior.start()
+
+    def change(rough: bool) -> Array:
+        there, here = (posterior.predict(some, state.logs, state.record, rough)[0]
+                       for some in ([hidden(effect, **values)], []))
+        return there - here
+
+    right = change(rough=False)
+    assert 0 < np.abs(change(rough=True) - right).max() < 0.02 * np.abs(right).max()
 
 
 def test_readings_are_bounds_where_a_step_is_large_beside_the_noise_and_nowhere_else() -> None:
