@@ -270,7 +270,7 @@ def test_what_was_not_fitted_says_so() -> None:
     reported = same_road_json(found)
     assert reported["candidates"][0]["error"] == 0.28 and reported["candidates"][0]["fitted"] is False
     assert reported["maybe_over_two_roads"] == [["slow", "brisk"]]
-    assert any(words.startswith("Whether slow and brisk follow one road") for words in reported["sentences"])
+    assert any(words.startswith("Whether slow and brisk are over one road") for words in reported["sentences"])
 
 
 @pytest.mark.slow
