@@ -12,6 +12,7 @@ with a damper and a spring beside: B. Spencer et al., J. Eng. Mech. 123 (1997) 2
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 import tempfile
 from collections.abc import Callable
@@ -19,6 +20,7 @@ from pathlib import Path
 
 import numpy as np
 import numpy.typing as npt
+from numba import njit
 from scipy.interpolate import CubicSpline
 from scipy.optimize import least_squares
 
@@ -28,11 +30,12 @@ from .figures import Figures
 Array = npt.NDArray[np.float64]
 Law = Callable[[Array, Array, Array, float], Array]
 """Force (n,) [N] by numbers, travel (n,) [m] and its rate (n,) [m/s], at steps of so many seconds."""
-FINE = 8
+FINE = 4
 VEHICLE = ("name: damper\nmodel: component\nstiffness_n_per_m: 0 +- {}\ndamping_n_s_per_m: {} +- 100%\n"
            "preload_n: unknown\n")
 
 
+@njit  # type: ignore[untyped-decorator]  # numba has no types
 def lugre(p: Array, travel_m: Array, rate_mps: Array, step_s: float) -> Array:
     """Bristles by their logarithms: stiffness, damping, viscous, Coulomb, break-away over it, Stribeck rate; zero."""
     s0, s1, viscous, coulomb, more, stribeck = np.exp(p[:6])
@@ -44,12 +47,14 @@ def lugre(p: Array, travel_m: Array, rate_mps: Array, step_s: float) -> Array:
     return force + p[6]
 
 
+@njit  # type: ignore[untyped-decorator]
 def bouc_wen(p: Array, travel_m: Array, rate_mps: Array, step_s: float) -> Array:
     """By their logarithms: size, travel of the yield, sharpness, damper, spring; zero."""
     size, over, sharpness, damper, spring = np.exp(p[:5])
     force, z = np.empty_like(travel_m), 0.0
     for k, v in enumerate(rate_mps):
-        z = np.clip(z + step_s * v / over * (1 - 0.5 * abs(z) ** sharpness * (1 + np.sign(v * z))), -1.0, 1.0)
+        z += step_s * v / over * (1 - 0.5 * abs(z) ** sharpness * (1 + np.sign(v * z)))
+        z = min(max(z, -1.0), 1.0)
         force[k] = size * z + damper * v + spring * travel_m[k]
     return force + p[5]
 
@@ -116,7 +121,10 @@ def error_of_fit(law: Law, starts: list[Array], learn_from: Path, kept_back: Pat
             return np.nan_to_num(law(p, curve(at), curve(at, 1), step_s)[::FINE] - force_n, nan=1e6)[20:]
 
     one, other = read(learn_from), read(kept_back)
-    best = min((least_squares(residual, start, args=(one,), x_scale=0.3, max_nfev=60) for start in starts),
+    drawn = np.random.default_rng(1).normal(0.0, 0.7, (3, len(starts[0])))
+    best = min((least_squares(residual, start + off, args=(one,), max_nfev=100,
+                             x_scale=np.r_[np.full(len(start) - 1, 0.3), one[2].std()])
+                for start in starts for off in (0 * drawn[0], *drawn)),
                key=lambda found: found.cost)
     left = residual(best.x, other)
     return float((left - left.mean()).std() / other[2][20:].std())
@@ -133,13 +141,9 @@ def error_of_learn(folder: Path, learn_from: Path, kept_back: Path) -> float:
     called("learn", "--vehicle", vehicle, "--out", law, learn_from)
     names = str(law)
     if not law.is_file():
-        import json
-
         verdict = json.loads(called("diagnose", "--json", "--vehicle", vehicle, learn_from).stdout)["missing"]
         names = "+".join(one["effect"] if isinstance(one, dict) else one for one in verdict)
     called("add-effect", names, "--vehicle", vehicle, "--out", with_law, learn_from)
-    import json
-
     return float(json.loads(called("compare", "--json", "--vehicle", with_law, kept_back).stdout)["error"])
 
 

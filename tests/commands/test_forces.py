@@ -13,8 +13,13 @@ import pytest
 from scipy.signal import butter, sosfiltfilt
 
 import ridelog
+from logger.api.lab.bench import bench_with
+from logger.api.lab.question import CompareQuestion
 from logger.commands.main import main
 from logger.errors import BadInput
+from logger.lab.likelihood.map_fit import align, fit_to_the_end
+from logger.lab.likelihood.standard_errors import standard_errors
+from logger.vehicle.named_parameters import read
 
 from ..support.drives.course import Course, integrated
 from ..support.slow import slow
@@ -592,6 +597,26 @@ def test_a_number_far_from_what_its_file_knows_is_named(tmp_path: Path, capsys: 
     assert main(["identify", "--vehicle", str(tmp_path / "bench.yaml"), str(run)]) == 0
     assert "stiffness_n_per_m came out 5.3 standard deviations from what" in " ".join(
         "".join(capsys.readouterr()).split())
+
+
+def test_the_noise_of_what_drives_a_rig_is_in_the_errors_of_its_numbers(tmp_path: Path) -> None:
+    """The resonance makes more of it than of all other noise: by the residual's level alone the errors of spring and
+    damper over the mass would be a quarter. (The scale of all three is that of the sensor.)"""
+    bench, over_mass, off = Bench(0.8, 2000.0, 2.0), np.array([[-1.0, 1, 0], [-1, 0, 1]]), []
+    (tmp_path / "bench.yaml").write_text(bench.yaml.replace("2000.0", "1800 +- 50%").replace("2.0\n", "unknown\n"))
+    for seed in range(3):
+        push = noise(30.0, 8.0, 4 + seed)
+        record = {"displacement_m": bench.moved(NOTHING, push, NOTHING)["displacement_m"]}
+        force_n = push(TIME_S) + np.random.default_rng(seed).normal(0.0, 0.16, len(TIME_S))
+        run = written(tmp_path / f"run{seed}", record, {"force_n": force_n}, BODY)
+        posterior = bench_with(CompareQuestion(tmp_path / "bench.yaml", [run])).posterior()
+        model = fit_to_the_end(align(posterior, posterior.start()))
+        found = posterior.prior.vehicle(posterior.vehicle, model.state.logs)
+        logs = np.log([read(found, name) / true for name, true in zip(
+            posterior.prior.names, (0.8, 2000.0, 2.0), strict=True)])
+        covariance = over_mass @ standard_errors(model).covariance @ over_mass.T
+        off += [*(over_mass @ logs / np.sqrt(np.diag(covariance)))]
+    assert np.sqrt(np.mean(np.square(off))) < 2.0
 
 
 def test_two_effects_are_added_together(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
