@@ -138,13 +138,11 @@ def error_of_learn(folder: Path, learn_from: Path, kept_back: Path) -> float:
     vehicle, law, with_law = (folder / name for name in ("damper.yaml", "law.py", "with-law.yaml"))
     vehicle.write_text(VEHICLE.format(round(force_n.std() / travel_m.std(), -1), round(force_n.std() / rate.std())))
     law.unlink(missing_ok=True)
-    called("learn", "--vehicle", vehicle, "--out", law, learn_from)
-    names = str(law)
-    if not law.is_file():
-        verdict = json.loads(called("diagnose", "--json", "--vehicle", vehicle, learn_from).stdout)["missing"]
-        names = "+".join(one["effect"] if isinstance(one, dict) else one for one in verdict)
-    called("add-effect", names, "--vehicle", vehicle, "--out", with_law, learn_from)
-    return float(json.loads(called("compare", "--json", "--vehicle", with_law, kept_back).stdout)["error"])
+    found = json.loads(called("learn", "--json", "--vehicle", vehicle, "--out", law, learn_from).stdout)
+    if names := "+".join([*([str(law)] if law.is_file() else []), *found["verdict"]]):
+        called("add-effect", names, "--vehicle", vehicle, "--out", with_law, learn_from)
+    vehicle = with_law if names else vehicle
+    return float(json.loads(called("compare", "--json", "--vehicle", vehicle, kept_back).stdout)["error"])
 
 
 def starts_of(run: Path) -> tuple[list[Array], list[Array]]:
