@@ -6,8 +6,8 @@ of it is true, for twice the road about a place twice as far from the edge toggl
 step ten times as much, for the probability of leaving it falls as that of a tail does. Newton's steps with the wrong
 curvature run in circles, and standard errors by it are wrong as much.
 
-Solution. Beside every other block it is solved again with the level raised by ``RISE``, from the bounds of the block as
-far as they moved in the blocks before, until the curvature rests: the difference of both slopes. By the difference of
+Solution. Beside every other block it is solved once more with the level raised by ``RISE``, from the bounds of the
+block as far as they moved in the blocks before. The difference of both slopes is the curvature; by the difference of
 both solutions bounds and road go along with a level that changes, so that they need not be found anew.
 """
 
@@ -24,6 +24,7 @@ from logger.estimation.roughness import resolved_shares
 
 RISE = 0.4  # of the log level, by 22 % of an IRI: about a standard error of it where steps hide a road
 _FOLLOWED_SAMPLES = 600  # the newest, whose bounds have gone through fewer than four blocks
+_TAKEN_OVER = 0.2  # of a new curvature, every 4 s: over the 20 s of a block
 _LEAST_CURVATURE = 0.15  # of the expected one: a third of it where readings toggle about one edge
 _MOST_CHANGE = 0.5  # of a precision at once, so that one is left
 
@@ -58,6 +59,7 @@ class LevelResponse:
     def __init__(self) -> None:
         self._precision = self._pull = np.zeros(0)
         self._road: tuple[Block, Complex] | None = None
+        self._curvatures = np.zeros(2)
         self.curvature = 1.0
 
     def move_on(self, readings: int) -> None:
@@ -92,5 +94,7 @@ class LevelResponse:
         self._road = block, raised.waves - answer.waves
         counted = answer.seen * (np.arange(block.count) < block.point_at(-_FOLLOWED_SAMPLES))
         slope, expected = answer.slope(counted)
-        if expected > 0:
-            self.curvature = max((slope - raised.slope(counted)[0]) / RISE / expected, _LEAST_CURVATURE)
+        fresh = np.array([(slope - raised.slope(counted)[0]) / RISE, expected])
+        self._curvatures = (1 - _TAKEN_OVER) * self._curvatures + _TAKEN_OVER * fresh
+        if self._curvatures[1] > 0:
+            self.curvature = max(float(self._curvatures[0] / self._curvatures[1]), _LEAST_CURVATURE)

@@ -52,9 +52,7 @@ _COARSE_ROUNDS, _COARSE_STEPS = 2, 2
 # level moves by less than changes an IRI by 3 %, and the variances of bounds by less than 3 % (r.m.s.). Nowhere else do
 # these move. With rounds counted, not measured, sections at 20 to 30 mph that steps hide read 11 to 14 % too smooth.
 _MORE_ROUNDS, _LEVEL_RESTS, _BOUNDS_REST = 10, 0.06, 0.03
-# Blocks: how bounds answer a level changes slowly. Where readings toggle about one edge a single round saw two thirds
-# of the curvature where a third is true, so that standard errors were too small and levels followed too late.
-_RAISED_EVERY, _MOST_RAISED, _CURVATURE_RESTS = 2, 8, 0.02
+_RAISED_EVERY = 2  # blocks: how bounds answer a level changes slowly, and a block is a round dearer for it
 _MOST_DEVIATIONS = 3.0
 _LEAST_SHOWN = 1e-3
 _SMOOTHEST_SOLVED = -6.0  # an IRI of 0.12: a bump on a smoother road takes more steps of the solver
@@ -259,13 +257,9 @@ class FollowedRoad:
         self._blocks += is_last
         if self._answer is not None and is_last and before is not None and self._blocks % _RAISED_EVERY == 0:
             raised = begun_with._raised_from(block, self._answer)
-            for _ in range(_MOST_RAISED):
-                curvature = self._response.curvature
-                raised._round(block, samples, read, seen, steps, before, False, False, beyond_mps2, beyond_variance)
-                assert raised._answer is not None
-                self._response.learn(block, self._answer, raised._answer)
-                if abs(self._response.curvature - curvature) < _CURVATURE_RESTS:
-                    break
+            raised._round(block, samples, read, seen, steps, before, False, False, beyond_mps2, beyond_variance)
+            assert raised._answer is not None
+            self._response.learn(block, self._answer, raised._answer)
             self._roughness.curvature = self._response.curvature
         return result
 
