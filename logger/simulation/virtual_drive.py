@@ -222,7 +222,7 @@ _UNSEEN, _SMALL_STATE = 1e-4, 1e-6
 
 def _beginning(car: Car, passage: Passage, run: Run, near: Beginning | None = None) -> Beginning:
     """The state with which the car's records come nearest to what the run measured; one step of Gauss and Newton away
-    from that of a car that hardly differs (``near``), where there is one.
+    from that of a car that hardly differs (``near``), where there is one (L. Kaufman, BIT 15 (1975) 49).
 
     Problem: what is pulled and let go, or was struck before its record begins, is in a state that nobody wrote down,
     and so is a part with a memory, which came to its first sample from above or from below; every number of the car
@@ -241,7 +241,8 @@ def _beginning(car: Car, passage: Passage, run: Run, near: Beginning | None = No
     record, step, wanted, plain = weighed.of, weighed.step, weighed.measured, car.linear
     passage.under_wheels(passage.driven(car.structure))  # asked for once, for all states
     count = 2 * len(car.structure.mass) + car.memories
-    if near is not None and len(near.state) == count:
+    # A linear car needs no more steps, and what hangs on it has a state of its own as soon as it weighs something.
+    if near is not None and car.bends_laws and len(near.state) == count:
         left = wanted - record(car, passage.begun_with(near.state))
         return replace(near, state=near.state + step(near.columns, left))
     columns, state, usual = np.zeros((len(wanted), count)), np.zeros(count), np.ones(count)

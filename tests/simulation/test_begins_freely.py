@@ -92,3 +92,21 @@ def test_a_part_with_a_memory_is_cut_out_of_its_motion_anywhere(first: int) -> N
         "yield_force_n": 600.0, "yield_travel_m": 8e-4, "sharpness_ratio": 0.8, "axle": 0.0})
     (found,) = SimulatedRuns([run]).predict(compose(part, (memory,)))
     assert np.abs(found - force_n)[5:-5].max() < 0.01 * np.abs(force_n).max()
+
+
+HUNG = Chosen(shipped_effects()["occupant"], {"mass_kg": 0.05, "frequency_hz": 6.0, "damping_ratio": 0.25})
+
+
+@pytest.mark.parametrize("effects", [(), (CUBIC,), (CUBIC, HUNG)], ids=["linear", "cubic", "hung"])
+def test_a_car_that_hardly_differs_begins_a_step_away(effects: tuple[Chosen, ...]) -> None:
+    """One with a spring 0.1 % stiffer; and one on which something hangs, which has a state of its own. What the step
+    leaves out is what another state does, and so changes no squares: their slope is the whole one's."""
+    samples = let_go(-0.07, 0.3, lambda x, _v: -8000 * x**3)["displacement"]
+    runs = SimulatedRuns([run_of("displacement", samples)], steps_hz(MASS))
+    stiffer = compose(Vehicle("stiffer", "single_mass", M, None, Axle(0.0, 0.0, 1.001 * K, C, 0.0), None, 0.0), effects)
+    (before,), (alone,) = runs.predict(compose(MASS, effects)), runs.predict(stiffer)
+    (near,) = runs.predict(stiffer, near=runs.beginnings(compose(MASS, effects)))
+    left = samples - samples.mean() - before
+    assert left @ (near - before) == pytest.approx(left @ (alone - before), rel=0.05)
+    if HUNG in effects:
+        assert runs.predict(stiffer, near=runs.beginnings(compose(MASS, (CUBIC,))))[0] == pytest.approx(alone)
