@@ -186,17 +186,21 @@ def sized(effect: Effect, vehicle: Vehicle, scales: Scales | None = None) -> Eff
     a rig of 25 N still. Solution: a vehicle that is lighter or quicker than cars by a factor has forces, springs,
     dampers and travels that follow by their dimensions (E. Buckingham, Physical Review 4, 1914), gravity being the same
     for all: with masses as m and times as t, travels go as t2, forces as m, springs as m / t2, dampers as m / t. Where
-    ``scales`` are known of a bench, on which gravity drives nothing, forces, travels and times go by them. Places
+    ``scales`` are known of a bench, on which gravity drives nothing, forces, travels and times go by them. Of a part
+    without them, which may be a bushing's or a bridge's, no size is known: its bounds hold no number back. Places
     on the car go with its wheelbase. Factors of masses and places are powers of ten, those of times half ones, as
     trials are that far apart: of every car they are 1. It has the parameters that the vehicle has parts for.
     """
     effect = effect.on(vehicle)
-    if scales is None:
+    if scales is not None:
+        found = tuple(_times(one, _factor(effect, one.name, scales, 1.0)) for one in effect.parameters)
+    elif structure_of(vehicle).held:
+        found = tuple(_of_any_size(one, _factor(effect, one.name, Scales(2.0, 3.0, 5.0), 1.0) != 1.0)
+                      for one in effect.parameters)
+    else:
         mass, time, wheelbase = _factors(vehicle)
         scales = Scales(mass, time**2, time)
-    else:
-        wheelbase = 1.0
-    found = tuple(_times(one, _factor(effect, one.name, scales, wheelbase)) for one in effect.parameters)
+        found = tuple(_times(one, _factor(effect, one.name, scales, wheelbase)) for one in effect.parameters)
     if found == effect.parameters:
         return effect
     made = copy(effect)
@@ -233,6 +237,14 @@ def _factor(effect: Effect, name: str, scales: Scales, wheelbase: float) -> floa
     if name.endswith(_LENGTH):
         return scales.way if isinstance(effect, ForceEffect) else wheelbase
     return 1.0  # frequencies that resonate are looked for everywhere between bounce and what the recorder keeps
+
+
+def _of_any_size(one: Parameter, has_size: bool) -> Parameter:
+    """With bounds that rounding sets, if it ``has_size`` (a force, a length, a rate), and its sign."""
+    if not has_size:
+        return one
+    smallest, largest = np.finfo(float).eps, 1 / np.finfo(float).eps
+    return replace(one, low=one.low * (smallest if one.low > 0 else largest), high=one.high * largest)
 
 
 def _times(one: Parameter, factor: float) -> Parameter:
