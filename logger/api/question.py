@@ -560,8 +560,8 @@ LowPass = Annotated[float | None, Option(
     "leave out frequencies above it, for example 20, in the record and in the model; errors are of the rest (default: "
     "all that the record holds; a record that somebody has low-passed is recognised, and said)", metavar="HZ")]
 EffectFiles = Annotated[Sequence[Path | str], Option(
-    "a Python file with an effect of your own, to be tried as well; may repeat. Or hysteresis or frame_friction, "
-    "effects of ridelog that it tries only on request",
+    "a Python file with an effect of your own, to be tried as well; may repeat. Or the name of an effect of ridelog "
+    "that it tries elsewhere only, such as play",
     metavar="FILE.py", read=Path, many=list, flag="--effect-file")]
 
 

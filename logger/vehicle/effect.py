@@ -187,6 +187,7 @@ class Effect(ABC):
     reshapes     whether it does more than that
     replaces     those of its parameters that are numbers of the car, which it sets, whatever they are
     sought       whether a search tries it where nobody asked for it by name
+    sought_last  whether it does so anywhere else, too, where all others leave something unexplained
     needs_road   whether it asks for a road, a speed or a distance, which a rig does not have
     needs_wheel  whether it asks for a wheel, a tire or a car's body, which a mass on a base does not have
     needs_body   whether something hangs on what moves freely, which a part that its bench moves does not
@@ -211,6 +212,7 @@ class Effect(ABC):
     reshapes: bool = True
     replaces: tuple[str, ...] = ()
     sought: Sought = Sought.ALWAYS
+    sought_last: bool = False
     needs_road: bool = False
     needs_wheel: bool = False
     needs_body: bool = False

@@ -16,6 +16,9 @@ from logger.store.formats.effect_file import shipped_effects
 from ..support.lab.runs_with_effects import FEW, OWN, named, out_of_balance, write_runs
 
 
+EVERY = dict(shipped_effects())
+
+
 @pytest.fixture(autouse=True)
 def few_effects(monkeypatch: pytest.MonkeyPatch) -> None:
     few = {name: shipped_effects()[name] for name in FEW}
@@ -143,3 +146,17 @@ def test_what_cannot_be_diagnosed(offset_runs: list[str], tmp_path: Path) -> Non
     ):
         with pytest.raises(BadInput, match=words):
             diagnose(*offset_runs, *arguments)
+
+
+@pytest.mark.slow
+def test_what_a_car_seldom_has_is_tried_where_all_else_leaves_something_unexplained(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    more = {name: EVERY[name] for name in (*FEW, "hysteresis")}
+    monkeypatch.setattr("logger.store.formats.effect_file.shipped_effects", lambda: more)
+    leaves = named("hysteresis", yield_force_n=150.0, yield_travel_m=0.0015, sharpness_ratio=1.0)
+    for runs, found in ((write_runs(tmp_path / "leaves", leaves), ["hysteresis"]),
+                        (write_runs(tmp_path / "plain", []), [])):
+        assert diagnose("--json", *runs) == 0
+        said = json.loads(capsys.readouterr().out)
+        assert said["verdict"] == found
+        assert ("hysteresis" in {one["effect"] for one in said["candidates"]}) is bool(found)

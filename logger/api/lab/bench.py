@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import copy
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -55,6 +55,7 @@ class Bench:
     effects      those that there are, by name
     files        of the user's own among them
     tolerance    by what the car's numbers may well be off
+    last         effects that are tried where all others leave something unexplained, by name
     """
 
     word: str
@@ -63,6 +64,7 @@ class Bench:
     effects: Mapping[str, Effect]
     files: Mapping[str, str]
     tolerance: Tolerance
+    last: Mapping[str, Effect] = field(default_factory=dict)
 
     def posterior(self, searches: bool = False) -> Posterior:
         """What the lab fits; simulated less finely where it ``searches``.
@@ -112,8 +114,13 @@ class Bench:
         """Which effects the model lacks, without some that are left out. Where the runs contradict what is known of the
         car's numbers and nothing explains that, nothing is taken to be known of them. BadInput as ``compared``."""
         effects = {name: effect for name, effect in self.effects.items() if name not in left_out}
+        last = {name: effect for name, effect in self.last.items() if name not in left_out}
         with self.blamed():
             found = diagnose(self.posterior(searches=True), effects, self.model.effects, notify)
+            if found.exceeds_noise and last:
+                notify(f"something is left unexplained: searching with {' and '.join(last)}, too")
+                more = diagnose(self.posterior(searches=True), {**effects, **last}, self.model.effects, notify)
+                found = more if {*more.verdict} & {*last} else found
             if found.verdict or not (found.beyond and found.exceeds_noise) or not self.timed:
                 return found
             notify("the runs contradict the vehicle's file: searching with its numbers unknown")
@@ -207,10 +214,13 @@ def bench_of(word: str, model: CarModel, runs: SimulatedRuns, effect_files: Sequ
     warn        called where it will take long, and with what was wrong where the user goes on ``anyway``
     low_pass_hz what lies above is not compared; None: all is that the records hold
     """
-    effects, files = known_effects(model, effect_files, are_on_rig(runs.runs), _scales(word, model, runs))
+    scales = _scales(word, model, runs)
+    effects, files = known_effects(model, effect_files, are_on_rig(runs.runs), scales)
+    last = {name: sized(one, model.vehicle, scales) for name, one in effect_file.shipped_effects().items()
+            if one.sought_last and name not in effects}
     if searches is not None:
         require_compiler(searches, effects.values())
-    found = Bench(word, model, runs, effects, files, tolerance)
+    found = Bench(word, model, runs, effects, files, tolerance, last)
     if words := slow_words([one.effect for one in model.effects]):
         warn(words)
     shipped = {name: one for name, one in effects.items() if name not in files}  # the user's own are not tried yet
@@ -315,6 +325,11 @@ def sought_effects(on_rig: bool = False, of_part: bool = False) -> dict[str, Eff
     """
     where = (Sought.ALWAYS, *[Sought.ON_RIGS] * on_rig, *[Sought.ON_PARTS] * of_part)
     return {name: one for name, one in effect_file.shipped_effects().items() if one.sought in where}
+
+
+def with_candidates(bench: Bench, names: Collection[str] | None) -> Bench:
+    """The bench where only effects of these names are tried, as ``among`` has them."""
+    return bench if names is None else replace(bench, effects=among(bench.effects, names), last={})
 
 
 def among(effects: Mapping[str, Effect], names: Collection[str] | None) -> dict[str, Effect]:

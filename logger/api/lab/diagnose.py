@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from logger.api.drives import Run
-from logger.api.lab.bench import Bench, among, bench_with, known_effects, tolerance_of, word_of
+from logger.api.lab.bench import Bench, among, bench_with, known_effects, tolerance_of, with_candidates, word_of
 from logger.api.lab.checks import check_distances, check_record, driven_parts, thinned_runs
 from logger.api.lab.compare import forces_section, spectra_section
 from logger.api.lab.question import DiagnoseQuestion
@@ -135,7 +135,7 @@ def diagnosed(question: DiagnoseQuestion) -> Diagnosis:
     if question.same_road:
         return _diagnosed_same_road(question)
     bench = bench_with(question, None if question.candidates is not None else "ridelog diagnose")
-    bench = replace(bench, effects=among(bench.effects, question.candidates))
+    bench = with_candidates(bench, question.candidates)
     found = bench.diagnosed(question.progress)
     return diagnosis_of(found, bench, None if question.list_all else _SHOWN, _next(question, bench, found))
 

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from logger.api.lab import compare as comparing
-from logger.api.lab.bench import Bench, among, bench_with
+from logger.api.lab.bench import Bench, bench_with, with_candidates
 from logger.api.lab.diagnose import (
     Diagnosis,
     diagnosis_lines,
@@ -99,7 +99,7 @@ class LabStory(CommandResult):
 def story_of(question: LabLoopQuestion) -> LabStory:
     """The answer to ``LabLoopQuestion``, which says what is raised."""
     place, bench = Path(question.out), bench_with(question, None if question.candidates is not None else "ridelog lab")
-    bench = replace(bench, effects=among(bench.effects, question.candidates))
+    bench = with_candidates(bench, question.candidates)
     make_ready(bench, place)
     return walk(bench, place, _asking(question.ask), unsaid_lines, lambda: nullcontext(question.progress),
                 learns=lambda: question.learns)

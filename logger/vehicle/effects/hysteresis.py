@@ -8,8 +8,8 @@ stiffness F / y, and n the sharpness of the yield,
 which is the law of Bouc and Wen with A = 1 and equal shares of both its shapes: it is let go along its first stiffness,
 and after a long way it is Coulomb friction. Without a yield travel it is ``dry_friction`` from the beginning.
 
-A search tries it unasked of a part alone on its bench, as rubber does that. Of a car it has to be asked for by name: it
-makes a quick search half as long again. One that was not asked to try it finds the residual of such a car unexplained.
+A search tries it first of a part alone on its bench, as rubber does that; of a car, where it makes a search half as
+long again, when all others leave something unexplained.
 """
 
 from __future__ import annotations
@@ -50,6 +50,7 @@ class Hysteresis(ForceEffect):
     signature = "small motions meet a stiffer spring, larger ones friction; each reversal begins stiff"
     shown_by = "drive a smooth road and a rough one slowly, so that the suspension moves by a few millimetres"
     sought = Sought.ON_PARTS
+    sought_last = True
 
     def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
         if p.yield_force_n == 0:

@@ -21,6 +21,7 @@ class OrificeDamping(ForceEffect):
     signature = "the damping grows with the motion: strong motions die away faster than weak ones"
     shown_by = "move it weakly and strongly at the same frequency"
     sought = Sought.ON_RIGS
+    sought_last = True
 
     def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
         size, damper = p.quadratic_damping_n_s2_per_m2, laws.damper

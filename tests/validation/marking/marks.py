@@ -21,6 +21,7 @@ NEAR = 1.1
 _SHARE, _DEVIATIONS = 0.10, 3.0
 _FROM_ONE = ("gain", "scale", "rebound_to_bump_ratio")
 _NAME_ONLY = ("roll",)  # what is linear moves a sensor on the centre line alike for any track width
+_BY_NOW = {"bushing_hysteresis": "hysteresis", "quadratic_damping": "orifice_damping"}
 CLASSES = (("below 1", 0.0, 1.0), ("1 to 3", 1.0, 3.0), ("above 3", 3.0, float("inf")))
 
 NOTHING, UNEXPLAINED, FAILED = "nothing", "unexplained", "no answer"
@@ -89,10 +90,11 @@ def unexplained(record: Record) -> bool:
 
 
 def off_list_seen(record: Record) -> bool:
-    """What is off the list was said to be there: as something that no candidate explains or, where it is an effect of
-    the list in one axle alone, by that name at an axle."""
+    """What is off the list was said to be there: as something that no candidate explains, by the effect of the list
+    that it is by now or, where it is one of them in one axle alone, by that name at an axle."""
     akin = {name for one in record["truth"]["outsiders"] for name in one["akin"]}
-    return unexplained(record) or any(
+    by_now = {_BY_NOW.get(one["name"]) for one in record["truth"]["outsiders"]}
+    return unexplained(record) or bool(by_now & set(verdict(record))) or any(
         one["effect"] in akin & set(verdict(record)) and one["parameters"].get("axle")
         for one in (record["said"] or {"candidates": ()})["candidates"])
 
