@@ -77,7 +77,7 @@ def test_errors_are_as_large_as_predicted(speed_mps: float, iri: float, waviness
     numbers = range(COUNT // POINTS - 1)
     windows = [slice(number * POINTS, (number + 1) * POINTS + 1) for number in numbers]
     nothing = np.zeros(POINTS + 1)
-    estimates = [window_iri(found[w], nothing, nothing, knowledge, 0.0, WINDOW_M) for w in windows]
+    estimates = [window_iri(found[w], nothing, nothing, knowledge, 0.0, WINDOW_M, 0.0) for w in windows]
     exact = np.array([1000 * np.trapezoid(np.abs(true[w])) / POINTS for w in windows])
     estimate = np.array([one.iri_m_per_km for one in estimates])
     std = np.array([one.own_std_m_per_km for one in estimates])
