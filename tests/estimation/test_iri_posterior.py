@@ -93,7 +93,7 @@ def test_the_levels_error_moves_all_windows_alike(rise: float) -> None:
     """The mean over a normally distributed level, and the deviation over it, by sums over many levels."""
     spectrum, level_std = RoadSpectrum.of_iri(1.0), 0.4
     flat, unseen = np.zeros(POINTS + 1), np.zeros(POINTS + 1)
-    found = window_iri(flat, unseen, flat + rise, knowledge_at(5.0, spectrum, 0.3), level_std, WINDOW_M)
+    found = window_iri(flat, unseen, flat + rise, knowledge_at(5.0, spectrum, 0.3), level_std, WINDOW_M, 0.0)
     off = np.linspace(-5, 5, 201)
     chance = np.exp(-0.5 * off**2) / np.exp(-0.5 * off**2).sum()
     left = [knowledge_at(5.0, rougher(spectrum, rise + level_std * one), 0.3).left(np.zeros(1))[0]
@@ -111,7 +111,7 @@ def rougher(spectrum: RoadSpectrum, rise: float) -> RoadSpectrum:
 def test_a_road_not_read_has_the_prior_mean_of_its_level() -> None:
     spectrum = RoadSpectrum.of_iri(3.0)
     known = knowledge_at(20.0, spectrum, 0.05)
-    blind = window_iri(np.zeros(POINTS + 1), np.ones(POINTS + 1), np.zeros(POINTS + 1), known, 0.0, WINDOW_M)
+    blind = window_iri(np.zeros(POINTS + 1), np.ones(POINTS + 1), np.zeros(POINTS + 1), known, 0.0, WINDOW_M, 0.0)
     assert blind.iri_m_per_km == pytest.approx(1000 * np.sqrt(2 / np.pi * known.variance), rel=1e-6)
     assert blind.iri_m_per_km == pytest.approx(3.0, rel=0.05)  # Eq 4.40, over 0.011 to 2.83 cycles per metre
 
