@@ -265,8 +265,8 @@ def _other_roads(runs: SimulatedRuns, followed: _Followed, car: Car) -> Iterator
         strangers = list(range(len(followed.around)))
     for k in strangers:
         found, run = followed.around[k], runs.runs[k]
-        if run.timed and _is_coherent(run, car):
-            continue
+        if run.begins_freely or (run.timed and _is_coherent(run, car)):
+            continue  # nothing drives what is let go, and its mode may lie anywhere
         what = "a record that follows its excitation" if run.timed else "a drive that follows the road of its profile"
         yield (f"{run.name}: expected {what}, found one that does not (correlation {found.correlation:.2f} around the "
                f"body's bounce; chance gives up to {found.chance:.2f}): {_advice(run, car, followed.band_hz)}")
@@ -326,6 +326,7 @@ LEAST_S = 5.0
 _LEAST_OF_PART_S = 1.0  # a damper's bench makes five turns a second
 _CLIPPED_SHARE = 0.005  # of a record: fewer are a blow or two (a judgement)
 _DIES_DOWN = 0.95  # of the r.m.s.: a damping ratio of 0.3 % does so within six periods (a judgement)
+_BY_CHANCE = 0.01  # that swings which do not shrink seem to (a judgement)
 _LEAST_PERIODS = 3.0  # of what swings freely: fewer leave its damping to chance (a judgement)
 # The lab looks up to 0.37 of the rate (lab/stretches.py): wheels that hop at 10 to 18 Hz are seen from 50 samples a
 # second on. A recorder's clock may be off by a per cent.
@@ -446,14 +447,27 @@ def least_s(drive: Drive, vehicle: Vehicle | None = None) -> float:
 
 
 def check_decay(drive: Drive, file: Path) -> None:
-    """Raise BadInput for a record that does not die down, of a run that nothing drives."""
+    """Raise BadInput for a record that does not die down, of a run that nothing drives: what little damps does so from
+    swing to swing, though its second half is hardly less than the first."""
     if begins_freely(getattr(drive, "track", None)):
         half = len(drive.accel_z_mps2) // 2
         first, last = (float(part.std()) for part in (drive.accel_z_mps2[:half], drive.accel_z_mps2[half:]))
-        if last > _DIES_DOWN * first:
+        if last > _DIES_DOWN * first and not _swings_shrink(drive.accel_z_mps2):
             raise BadInput(f"{file}: expected an excitation that moves the rig, or a free decay: nothing drives this "
                            f"record, yet its second half has {last / max(first, 1e-300):.2g} "
                            "times the r.m.s. of the first")
+
+
+def _swings_shrink(samples: Array) -> bool:
+    """Whether the swings, from one peak between zero crossings to the next, fall with time, by C. Spearman's rank
+    correlation (American Journal of Psychology 15, 1904)."""
+    from scipy.stats import spearmanr
+
+    around = samples - samples.mean()
+    starts = np.flatnonzero(np.diff(np.signbit(around), prepend=around[0] < 0))
+    peaks = np.maximum.reduceat(np.abs(around), starts)[:-1] if len(starts) else np.empty(0)
+    swings = peaks[:-1] + peaks[1:]
+    return len(swings) > 2 and bool(spearmanr(np.arange(len(swings)), swings, alternative="less").pvalue < _BY_CHANCE)
 
 
 _ORDERS = {"displacement": 0, "travel": 0, "velocity": 1, "acceleration": 2}
