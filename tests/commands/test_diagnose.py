@@ -15,7 +15,6 @@ from logger.store.formats.effect_file import shipped_effects
 
 from ..support.lab.runs_with_effects import FEW, OWN, named, out_of_balance, write_runs
 
-
 EVERY = dict(shipped_effects())
 
 
