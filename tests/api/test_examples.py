@@ -101,6 +101,7 @@ def test_what_is_wrong_is_one_line_and_nothing_is_printed(
         lambda: ridelog.compare(car, run, tolerance=2.0),
         lambda: ridelog.diagnose(car, run, candidates=["magic"]),
         lambda: ridelog.add_effect("payload", car.with_effect("payload"), run),
+        lambda: ridelog.add_effect("sensor_gain+sensor_offset", car, run, start={"offset": 0.1}),
         lambda: ridelog.calibrate(car, window_m=0.0), lambda: ridelog.calibrate(car, window_m=1e6),
         lambda: ridelog.read_channels(tmp_path / "wrong.csv"),
         lambda: ridelog.make_channels({"a": [1.0, 2.0], "b": [1.0]}, rate_hz=100.0),

@@ -91,6 +91,7 @@ def test_what_cannot_be_added(runs: list[str], tmp_path: Path) -> None:
         ("roll", "rav4-2009", out, "elevation_right_m"),
         ("sensor_gain:gain=9000", "rav4-2009", out, "sensor_gain: expected gain of"),
         ("sensor_gain:gain=much", "rav4-2009", out, "PARAM=NUMBER"),
+        ("sensor_gain+sensor_gain:gain=1.1", "rav4-2009", out, "each effect once, found sensor_gain again"),
         ("sensor_gain", "rav4-2009", Path(runs[0]) / "drive.csv", "does not belong to a run"),
         ("sensor_gain", "rav4-2009", tmp_path / "none" / "out.yaml", "a folder that exists"),
     ):

@@ -775,3 +775,19 @@ def test_the_shortest_test_of_a_part_is_compared_at_any_rate(rate_hz: int, tmp_p
     assert main(["compare", "--vehicle", str(tmp_path / "part.yaml"), str(run), "--json"]) == 0
     refitted = json.loads(capsys.readouterr().out)["refitted"]
     assert refitted["shifts"]["damping_n_s_per_m"] == pytest.approx(-1 / 3, abs=0.02)
+
+
+def test_whether_a_record_of_two_signals_follows_its_force_is_seen_in_the_first(tmp_path: Path) -> None:
+    """The vehicle's mode lies elsewhere; then under a force that was another test's."""
+    true = Bench(0.8, 2000.0, 0.6)
+    (tmp_path / "bench.yaml").write_text(
+        "name: bench\nmodel: single_mass\nmass_kg: 0.8\nstiffness_n_per_m: 3200 +- 60%\ndamping_n_s_per_m: unknown\n")
+    push, other = noise(30.0, 8.0, 4), noise(30.0, 8.0, 5)
+    moved = true.moved(NOTHING, push, NOTHING)
+    seen = {name: moved[name] for name in ("displacement_m", "velocity_mps")}
+    runs = [str(written(tmp_path / name, seen, {"force_n": force(TIME_S)}, BODY))
+            for name, force in (("right", push), ("wrong", other))]
+    vehicle = str(tmp_path / "bench.yaml")
+    assert main(["compare", "--vehicle", vehicle, runs[0]]) == 0
+    with pytest.raises(BadInput, match="is it another run's excitation"):
+        main(["compare", "--vehicle", vehicle, runs[1]])

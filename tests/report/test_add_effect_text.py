@@ -108,6 +108,7 @@ def test_the_rows_fit_their_heads_and_mark_what_was_biased() -> None:
 def test_the_object_has_what_the_contract_promises_and_is_of_the_effect_that_was_added() -> None:
     reported = json.loads(json.dumps(addition_json(FOUND), allow_nan=False))
     assert {"effect", "parameters", "standard_errors", "error_before", "error_after"} <= reported.keys()
+    assert reported["added"] == ["dry_friction"]
     assert reported["effect"] == "dry_friction" and reported["parameters"]["friction_force_n"] == 84.7
     assert reported["standard_errors"] == {"friction_force_n": 3.9}  # none that is not known
     assert (reported["error_before"], reported["error_after"]) == (0.47, 0.153)
@@ -118,3 +119,16 @@ def test_the_object_has_what_the_contract_promises_and_is_of_the_effect_that_was
     assert reported["vehicle_parameters"][1] == {
         "name": "sprung_mass_kg", "nominal": 875.0, "without": 846.0, "without_standard_error": 9.8, "with": 876.0,
         "with_standard_error": 7.5, "shift_standard_errors": 4.0}
+
+
+def test_several_effects_are_each_in_the_object_with_their_own_numbers() -> None:
+    reported = json.loads(json.dumps(addition_json(replace(FOUND, names=("dry_friction", "sensor_gain"))),
+                                     allow_nan=False))
+    assert reported["effect"] == "sensor_gain+dry_friction"
+    assert reported["parameters"]["sensor_gain.gain"] == 1.02
+    assert reported["parameters"]["dry_friction.friction_force_n"] == 84.7
+    assert reported["standard_errors"] == {"sensor_gain.gain": 0.01, "dry_friction.friction_force_n": 3.9}
+    gain, friction = reported["added"]
+    assert gain == {"name": "sensor_gain", "parameters": {"gain": 1.02}, "standard_errors": {"gain": 0.01}}
+    assert friction["name"] == "dry_friction" and friction["parameters"]["friction_force_n"] == 84.7
+    assert friction["standard_errors"] == {"friction_force_n": 3.9}

@@ -128,17 +128,20 @@ class Bench:
             again = diagnose(wide.posterior(searches=True), effects, self.model.effects, notify)
         return replace(again, contradicted=tuple(found.beyond)) if again.verdict else found
 
+    def named(self, name: str) -> tuple[Effect, str | None]:
+        """An effect by its name or that of its file, and the file. BadInput where it is not known."""
+        if name in self.effects:
+            return self.effects[name], self.files.get(name)
+        effect, file = effect_named(name)
+        return (effect if file else sized(effect, self.model.vehicle)), file
+
     def asked_for(self, name: str, values: Mapping[str, float], said: str) -> tuple[Effect, str | None]:
         """An effect to be added, and the file it is from. BadInput where it is not known, is in the model already, or
         cannot be there with these values.
 
         said    how it was asked for
         """
-        if name in self.effects:
-            effect, file = self.effects[name], self.files.get(name)
-        else:
-            effect, file = effect_named(name)
-            effect = effect if file else sized(effect, self.model.vehicle)
+        effect, file = self.named(name)
         if effect.name in [one.effect.name for one in self.model.effects]:
             raise BadInput(f"{self.word}: expected a vehicle without {effect.name}, which it has")
         try:

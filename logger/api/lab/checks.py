@@ -274,7 +274,7 @@ def _other_roads(runs: SimulatedRuns, followed: _Followed, car: Car) -> Iterator
 
 def _is_coherent(run: Run, car: Car) -> bool:
     """Whether some linear rig follows what drives this one: its own may be off by more than the width of its mode."""
-    still = ModelResiduals([run], car, [np.zeros((1 + len(run.signals)) * run.count)], [])
+    still = ModelResiduals([run], car, [np.zeros(run.count)], [])
     _, chance = coherence_with_road(still).explained(LOWEST_HZ, still.top_hz)
     return chance < FALSE_ALARM  # of a run too short to tell it is NaN
 

@@ -19,6 +19,7 @@ from logger.api.question import function, named_numbers
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
 from logger.chart_data import Array, Chart, Curves, Line, line
+from logger.errors import BadInput
 from logger.identification.noise_models import rms
 from logger.lab.another_car import POOR_ERROR
 from logger.lab.compare import LabComparison, Standing
@@ -100,7 +101,8 @@ class AddedEffect(CommandResult):
     """A model with one more effect, fitted with the car's numbers on all of the runs.
 
     found               all that the lab found
-    effect              its name; ``parameters`` and ``standard_errors`` by name
+    effect              its name, ``parameters`` and ``standard_errors`` by name; of several added together "A+B", with
+                        numbers by "A.number"
     error_before        of the model as it was; ``error_refitted`` of it with its numbers and the distances refitted
     error_after         of the model with the effect, refitted likewise
     noise_floor_error   that the sensor's noise alone makes
@@ -139,9 +141,7 @@ class AddedEffect(CommandResult):
 def added(question: AddEffectQuestion) -> AddedEffect:
     """The answer to ``AddEffectQuestion``, which says what is raised."""
     bench, starts, candidates = bench_with(question), list[Chosen](), 1
-    for name in question.names:
-        effect, file, values = asked_for(name, bench, question)
-        values |= dict(question.start or {})
+    for effect, file, values in _all_asked_for(bench, question):
         bench = bench.with_effect(effect, file)
         candidates *= 1 if set(values) >= {one.name for one in effect.parameters} else len(effect.trials())
         starts.append(bench.beside(starts).search_values(effect, values, question.progress))
@@ -152,13 +152,35 @@ def added(question: AddEffectQuestion) -> AddedEffect:
 add_effect = function("add_effect", AddEffectQuestion, added)
 
 
-def asked_for(text: str, bench: Bench, question: AddEffectQuestion | LabQuestion
+def _all_asked_for(bench: Bench, question: AddEffectQuestion) -> list[tuple[Effect, str | None, dict[str, float]]]:
+    """As ``asked_for``, of each effect, with those of the numbers where the fit begins that are its own. BadInput, too,
+    where an effect is there twice or a number is of none."""
+    found, start = list[tuple[Effect, str | None, dict[str, float]]](), dict(question.start or {})
+    for text in question.names:
+        effect, file, values = asked_for(text, bench, question, start, others=len(question.names) > 1)
+        if effect.name in [one.name for one, _, _ in found]:
+            raise BadInput(f"add-effect {question.name}: expected each effect once, found {effect.name} again")
+        found.append((effect, file, values))
+    known = {parameter.name for effect, _, _ in found for parameter in effect.parameters}
+    for name in start:
+        if name not in known:
+            raise BadInput(f"{question.name}: none of these effects has a parameter {name!r}; expected "
+                           f"{', '.join(sorted(known)) or 'no parameters'}")
+    return found
+
+
+def asked_for(text: str, bench: Bench, question: AddEffectQuestion | LabQuestion,
+              start: Mapping[str, float] | None = None, others: bool = False
               ) -> tuple[Effect, str | None, dict[str, float]]:
     """An effect as it was asked for, the file it is from, and what was said of its numbers. BadInput as
-    ``Bench.asked_for``."""
+    ``Bench.asked_for``.
+
+    start   numbers where its fit begins; where there are ``others``, those that it does not have are theirs
+    """
     name, values = named_numbers(text, "add-effect")
-    start = getattr(question, "start", None) or {}
-    effect, file = bench.asked_for(name, values | start, text)
+    own = {one.name for one in bench.named(name)[0].parameters}
+    values |= {key: value for key, value in (start or {}).items() if key in own or not others}
+    effect, file = bench.asked_for(name, values, text)
     if words := slow_words([effect]):
         question.warn(words)
     return effect, file, values
@@ -166,11 +188,10 @@ def asked_for(text: str, bench: Bench, question: AddEffectQuestion | LabQuestion
 
 def addition_of(found: AddedEffects, model: Model) -> AddedEffect:
     """What the lab found, as it is shown; the model with it."""
-    new = found.new[-1]
     return AddedEffect(
-        "\n".join(addition_lines(found)), addition_json(found), found, new.effect.name, dict(new.values),
-        dict(new.standard_errors), found.error_before, found.error_refitted, found.error_after,
-        found.noise_floor_error, found.p_value, found.helps, tuple(found.moved), model)
+        "\n".join(addition_lines(found)), addition_json(found), found, *_as_one(found.new),
+        found.error_before, found.error_refitted, found.error_after, found.noise_floor_error, found.p_value,
+        found.helps, tuple(found.moved), model)
 
 
 _HELPS = 0.97
@@ -663,12 +684,24 @@ def moved_rows(moved: Sequence[Number]) -> Iterator[tuple[str, str, str, str, st
 # --- for a program ---
 
 
+def _as_one(new: Sequence[Chosen]) -> tuple[str, dict[str, float], dict[str, float]]:
+    """Name, numbers and standard errors of what was added; of several effects, whose numbers may have the same names,
+    these begin with their effect's and a dot."""
+    if len(new) == 1:
+        return new[0].effect.name, dict(new[0].values), dict(new[0].standard_errors)
+    return ("+".join(one.effect.name for one in new),
+            {f"{one.effect.name}.{name}": value for one in new for name, value in one.values.items()},
+            {f"{one.effect.name}.{name}": error for one in new for name, error in one.standard_errors.items()})
+
+
 def addition_json(found: AddedEffects) -> dict[str, Any]:
-    """The contract's object, of the effect that was added last."""
-    new = found.new[-1]
+    """The contract's object; of several effects, each by itself under "added"."""
+    name, values, standard_errors = _as_one(found.new)
+    each = [{"name": one.effect.name, "parameters": dict(one.values), "standard_errors": finite(one.standard_errors)}
+            for one in found.new]
     return {
-        "effect": new.effect.name, "parameters": dict(new.values), "standard_errors": finite(new.standard_errors),
-        "added": list(found.names), "excess": found.excess,
+        "effect": name, "parameters": values, "standard_errors": finite(standard_errors),
+        "added": each if len(each) > 1 else list(found.names), "excess": found.excess,
         "error_before": found.error_before, "error_after": found.error_after,
         "error_refitted": found.error_refitted, "error_as_written": found.error_as_written,
         **lab_words.errors_json(found.steps, found.noise_floor_error),

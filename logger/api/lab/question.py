@@ -128,7 +128,8 @@ class AddEffectQuestion(LabQuestion):
     vehicle: question.VehicleName
     runs: question.TrackedRuns
     _: KW_ONLY
-    start: Annotated[Mapping[str, float] | None, "numbers of the effect by name, where its fit begins"] = None
+    start: Annotated[Mapping[str, float] | None,
+                     "numbers by name, where the fit begins; of several effects each takes its own"] = None
 
     @property
     def names(self) -> list[str]:

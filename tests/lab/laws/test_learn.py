@@ -113,7 +113,7 @@ def test_the_law_after_one_that_is_refused_is_learned() -> None:
     posterior = posterior_of(secret_runs([chosen(QuadraticDamping(), {})], rougher=2.0))
     few = {name: EFFECTS[name] for name in FEW[:2]}
     law = learn(posterior, few, {one.name: one for one in (Straight(right), right)}, EFFECTS, (), progress.append).law
-    assert f"{Straight.title}: fitting the car with it" in progress
+    assert f"{Straight.title}: fitting the model with it" in progress
     assert law is not None and law.draft.family is right
 
 
