@@ -216,7 +216,7 @@ def test_the_loop_asks_what_to_add(names: dict[str, Any], tmp_path: Path) -> Non
                         ask=asked.append)
     assert asked == ["sensor_gain"] and story.refused == ("sensor_gain",) and story.additions == ()
     assert [path.name for path in tmp_path.iterdir()] == ["story.html"]
-    assert "Missing, but not added as you wished: sensor_gain." in repr(story) and story.model.effects == ()
+    assert "Missing, but you chose not to add: sensor_gain." in repr(story) and story.model.effects == ()
     with pytest.raises(ridelog.BadInput, match="expected one of sensor_gain, time_offset"):
         ridelog.lab(names["car"], names["runs"], tmp_path, candidates=["sensor_gain", "time_offset"],
                     ask=lambda _: "rust")

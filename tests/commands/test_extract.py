@@ -170,7 +170,7 @@ def test_what_cannot_be_used_is_refused_in_one_line(place: Path, drive: DemoDriv
     dump = place / "town.dump"
     for words, said in (
         ((dump, "--profile", tmp_path / "mirrored.csv"), "from its end to its beginning"),
-        ((dump, "--profile", tmp_path / "far.csv"), "m aside of it"),
+        ((dump, "--profile", tmp_path / "far.csv"), "the nearest fix is"),
         ((dump, "--profile", tmp_path / "bare.csv"), "two rows or more with lat_deg,lon_deg"),
         ((dump, "--profile", tmp_path / "typo.csv"), "no farther apart than their distances"),
         ((changed(place, tmp_path / "a", lambda one: one.source != GPS),), "expected fixes with a speed and a place"),

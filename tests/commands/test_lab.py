@@ -120,7 +120,7 @@ def test_somebody_who_says_no(runs: list[str], tmp_path: Path, capsys: pytest.Ca
     assert len(asked) == 2 and "Add sensor_offset?" in asked[0]
     reported = capsys.readouterr().out
     assert "Expected yes, no, or one of " in reported
-    assert "Missing, but not added as you wished: sensor_offset." in reported
+    assert "Missing, but you chose not to add: sensor_offset." in reported
     assert [path.name for path in tmp_path.iterdir()] == ["story.html"]
 
 

@@ -126,7 +126,7 @@ def test_friction_is_named_and_stays_in_the_errors(learned: tuple[dict[str, Any]
     said, = answer["effects_missing"]
     assert "damping ratio" in said and "as with friction" in said
     end, rough, smooth = re.fullmatch(  # type: ignore[union-attr]
-        r".*: (\w+) damping ratio is ([\d.]+) .* on rough road, ([\d.]+) .* on smooth road.*", said).groups()
+        r".*: its (\w+) damping ratio is ([\d.]+) .*on rough roads and ([\d.]+) .*on smooth ones.*", said).groups()
     value, error = (answer[key][f"{end}.damping_ratio"] for key in ("parameters", "standard_errors"))
     low, high = (getattr(car, end)[1] for car in damped)
     assert low < float(rough) < value < float(smooth) < high and error > (float(smooth) - float(rough)) / 2

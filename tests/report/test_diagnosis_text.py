@@ -162,8 +162,10 @@ def test_what_explains_as_well_is_named_with_the_drives_that_would_separate_them
     alike = replace(FRICTION, confused_with=("damper_blow_off", "sensor_gain"))
     found = replace(FOUND, candidates=(alike, *OTHERS))
     verdict, drives, *_ = diagnosis_summary(found)
-    assert verdict.startswith("Either dry_friction, damper_blow_off or sensor_gain is missing; these runs cannot "
+    assert verdict.startswith("One of dry_friction, damper_blow_off and sensor_gain is missing; these runs cannot "
                               "distinguish them. If it is dry_friction (")
+    two = replace(FOUND, candidates=(replace(FRICTION, confused_with=("sensor_gain",)), *OTHERS))
+    assert diagnosis_summary(two)[0].startswith("Either dry_friction or sensor_gain is missing; these runs cannot ")
     assert drives.startswith("dry_friction, damper_blow_off and sensor_gain explain the residual about equally well. ")
     for name in ("dry_friction", "damper_blow_off", "sensor_gain"):
         assert f"{name}: {EFFECTS[name].shown_by}" in drives

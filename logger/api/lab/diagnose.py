@@ -468,8 +468,9 @@ def _missing(found: LabDiagnosis, one: Chosen) -> str:
         likely += f" The model's parameters were unknown; {there} of {count} starting points led to this result."
     says = "explains part of the residual, or imitates something else" if found.unexplained else "is missing"
     if candidate.confused_with:
-        group = enumerated([name, *candidate.confused_with], "or")
-        return (f"Either {group} {says}; these runs cannot distinguish them. If it is {name} ({one.effect.title})"
+        names = [name, *candidate.confused_with]
+        group = f"Either {enumerated(names, 'or')}" if len(names) == 2 else f"One of {enumerated(names, 'and')}"
+        return (f"{group} {says}; these runs cannot distinguish them. If it is {name} ({one.effect.title})"
                 f"{numbers}. {likely}")
     return f"{name} {says} ({one.effect.title}){numbers}. {likely}"
 
