@@ -57,8 +57,8 @@ class Denoised:
     deviation: float
     gain: Array
 
-    def left(self, draw: int) -> Array:
-        """Noise (n,) like what is still in the samples, one draw of it by its number."""
+    def left(self, *draw: int) -> Array:
+        """Noise (n,) like what is still in the samples, one draw of it by its numbers."""
         drawn = _spectrum(np.random.default_rng(draw).normal(0.0, self.deviation, len(self.samples)))
         return _odd_samples(drawn * np.sqrt(self.gain))
 

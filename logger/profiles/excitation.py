@@ -115,11 +115,10 @@ class Excitation:
         """Whether its samples show white noise, of which a part is still in it."""
         return any(one.deviation for one in (*self._denoised_m, *self._denoised_n))
 
-    def with_noise_left(self, draw: int) -> Excitation:
-        """The same with noise like what is still in it, one draw of that by its number."""
-        count = len(self._denoised_m)
-        moved = [one.samples + one.left(draw + at) for at, one in enumerate(self._denoised_m)]
-        pushed = [one.samples + one.left(draw + count + at) for at, one in enumerate(self._denoised_n)]
+    def with_noise_left(self, *draw: int) -> Excitation:
+        """The same with noise like what is still in it, one draw of that by its numbers."""
+        moved = [one.samples + one.left(*draw, 0, at) for at, one in enumerate(self._denoised_m)]
+        pushed = [one.samples + one.left(*draw, 1, at) for at, one in enumerate(self._denoised_n)]
         return replace(self, elevation_m=np.stack(moved, axis=1).reshape(self.elevation_m.shape),
                        force_n=np.stack(pushed, axis=1) if pushed else None)
 

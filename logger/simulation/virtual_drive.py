@@ -150,7 +150,7 @@ class SimulatedRuns:
         distance_error_m    distance driven minus distance recorded (n,), per run; None: 0
         rough               half as many steps where that is near enough for differences
         tracks              roads in place of the runs' own; each such object is cached by itself
-        near                how runs that begin freely begin with a car that hardly differs (``beginnings``)
+        near                how they begin with a car that hardly differs (``beginnings``)
         """
         with np.errstate(over="ignore", invalid="ignore"):
             passages = self._passages_of(car, distance_error_m, rough, tracks, near)
@@ -221,59 +221,80 @@ _UNSEEN, _SMALL_STATE = 1e-4, 1e-6
 
 
 def _beginning(car: Car, passage: Passage, run: Run, near: Beginning | None = None) -> Beginning:
-    """The state with which the car's records come nearest to what the run measured; one step of Gauss and Newton away
-    from that of a car that hardly differs (``near``), where there is one (L. Kaufman, BIT 15 (1975) 49).
+    """The state with which the car's records come nearest to what the run measured; the search for it begins at that of
+    a car that hardly differs (``near``), where there is one.
 
     Problem: what is pulled and let go, or was struck before its record begins, is in a state that nobody wrote down,
     and so is a part with a memory, which came to its first sample from above or from below; every number of the car
-    that is tried has its own best one. Solution: the state is eliminated wherever the run
-    is predicted (variable projection: G. Golub and V. Pereyra, SIAM J. Numer. Anal. 10, 1973). The records of a linear
-    car are linear in it, so that one solution of least squares finds it; from there Gauss-Newton steps lead to that of
-    a car whose laws are bent. Each signal counts by its own size, and its zero is free. What the record does not show
-    of the state stays at rest.
+    that is tried has its own best one. Solution: the state is eliminated wherever the run is predicted (variable
+    projection: G. Golub and V. Pereyra, SIAM J. Numer. Anal. 10, 1973). The records of a linear car are linear in it,
+    so that one solution of least squares finds it; from there Gauss-Newton steps lead to that of a car whose laws are
+    bent. Each signal counts by its own size, and its zero is free. What the record does not show of the state stays at
+    rest: memories have a normal prior of one unit of their law, which for friction is that it slides.
     """
-    if car.structure.held:  # what it remembers is gone after one cycle
-        places = passage.under_wheels(car.structure)[0][: run.count * passage.steps, 0]
-        gone = np.searchsorted(np.cumsum(np.abs(np.diff(places))), 2 * np.ptp(places)) // passage.steps
-        run = run.cut(max(int(gone), 2 * run.first) + 2)
-        passage = passage.cut(run.count)
-    weighed = _WeighedRecord(run)
-    record, step, wanted, plain = weighed.of, weighed.step, weighed.measured, car.linear
-    passage.under_wheels(passage.driven(car.structure))  # asked for once, for all states
-    count = 2 * len(car.structure.mass) + car.memories
-    # A linear car needs no more steps, and what hangs on it has a state of its own as soon as it weighs something.
-    if near is not None and car.bends_laws and len(near.state) == count:
-        left = wanted - record(car, passage.begun_with(near.state))
-        return replace(near, state=near.state + step(near.columns, left))
-    columns, state, usual = np.zeros((len(wanted), count)), np.zeros(count), np.ones(count)
-    moves = count - car.memories
     if car.structure.held:
+        run, passage = _one_cycle(car, passage, run)
+    weighed = _WeighedRecord(run)
+    wanted, plain = weighed.measured, car.linear
+    passage.under_wheels(passage.driven(car.structure))  # asked for once, for all states
+    moves, count = 2 * len(car.structure.mass), 2 * len(car.structure.mass) + car.memories
+    columns, state, usual = np.zeros((len(wanted), count)), np.zeros(count), np.ones(count)
+    if car.structure.held or not len(wanted):
         usual[:moves] = 0.0  # the bench moves it
     else:
-        still = record(plain, passage)
+        still = weighed.of(plain, passage)
         # Small, as records are clipped at what no sensor reads: 1 m is that of what is let go at 160 Hz.
         small = passage.begun_in_each(_SMALL_STATE * np.eye(moves))
-        columns[:, :moves] = np.stack([record(plain, one) - still for one in small], axis=1) / _SMALL_STATE
-        usual[:moves], state = weighed.usual(columns)[:moves], step(columns, wanted - still)
-    if not car.bends_laws:
+        columns[:, :moves] = np.stack([weighed.of(plain, one) - still for one in small], axis=1) / _SMALL_STATE
+        seen = np.linalg.norm(columns[:, :moves], axis=0)
+        usual[:moves] = np.divide(np.linalg.norm(wanted), seen, out=np.zeros_like(seen), where=seen > 0)
+        state = _towards(columns, wanted - still, usual, state, moves)
+    if not car.bends_laws or not len(wanted):
         return Beginning(state, columns)
-    here = record(car, passage.begun_with(state))
+    if near is not None and len(near.state) == count:  # what hangs on it has a state as soon as it weighs something
+        return _bent_beginning(car, passage, weighed, usual, moves, near, True)
+    return _bent_beginning(car, passage, weighed, usual, moves, Beginning(state, columns), False)
+
+
+def _bent_beginning(car: Car, passage: Passage, weighed: _WeighedRecord, usual: Array, moves: int, start: Beginning,
+                    is_near: bool) -> Beginning:
+    """The beginning with a car whose laws are bent, by Gauss-Newton steps, the first of them by the columns of one that
+    ``is_near``."""
+    state, columns, own = start.state, start.columns.copy(), not is_near
+    here = weighed.of(car, passage.begun_with(state))
     for _ in range(_MOST_STATE_STEPS):
-        for index, one in enumerate(_STATE_STEP * usual):
+        for index, one in enumerate(_STATE_STEP * usual * own):
             if one > 0:
                 beside = passage.begun_with(state + one * (np.arange(len(usual)) == index))
-                columns[:, index] = (record(car, beside) - here) / one
-        way, least = step(columns, wanted - here), float(np.sum((wanted - here) ** 2))
-        for share in (1.0, 0.5, 0.25, 0.1, 0.02):
-            there = record(car, passage.begun_with(state + share * way))
-            if np.sum((wanted - there) ** 2) < least:
+                columns[:, index] = (weighed.of(car, beside) - here) / one
+        way = _towards(columns, weighed.measured - here, usual, state, moves)
+        least, share = weighed.misfit(here, state[moves:]), 0.0
+        for share in (1.0, 0.5, 0.25, 0.1, 0.02, 0.0):
+            there = weighed.of(car, passage.begun_with(state + share * way))
+            if weighed.misfit(there, (state + share * way)[moves:]) < least:
                 break
-        else:
-            break
         state, here = state + share * way, there
-        if (np.abs(share * way) <= _STATE_CLOSE * usual).all():
+        if own and (np.abs(share * way) <= _STATE_CLOSE * usual).all():
             break
+        own = True
     return Beginning(state, columns)
+
+
+def _one_cycle(car: Car, passage: Passage, run: Run) -> tuple[Run, Passage]:
+    """The beginning of a run of a part: after it has moved through its stroke and back, what it remembered is gone."""
+    places = passage.under_wheels(car.structure)[0][: run.count * passage.steps, 0]
+    gone = np.searchsorted(np.cumsum(np.abs(np.diff(places))), 2 * np.ptp(places)) // passage.steps
+    count = max(int(gone), 2 * run.first) + 2
+    return run.cut(count), passage.cut(count)
+
+
+def _towards(columns: Array, left: Array, usual: Array, state: Array, moves: int) -> Array:
+    """The change of a state (c,) of these ``usual`` sizes that makes up for what is ``left`` (m,), by its ``columns``
+    (m, c); the memories, which follow ``moves`` others, have their prior."""
+    spread = np.sqrt(np.mean(left**2)) or 1.0
+    prior = np.arange(len(state)) >= moves
+    rows = np.vstack([columns * usual, np.diag(spread * prior)])
+    return np.asarray(usual * np.linalg.lstsq(rows, np.concatenate([left, -spread * prior * state]), rcond=_UNSEEN)[0])
 
 
 class _WeighedRecord:
@@ -284,7 +305,7 @@ class _WeighedRecord:
         read = run.read if run.usable is None else run.usable == READING
         self._counted = read & (np.arange(run.count) >= run.first)
         measured = np.stack([run.measured_mps2, *run.more])[:, self._counted]
-        self._sizes = measured.std(axis=1, keepdims=True)
+        self._sizes = measured.std(axis=1, keepdims=True) if self._counted.any() else np.ones((len(measured), 1))
         self._sizes[self._sizes == 0] = 1.0
         self.measured = self._weighed(measured)
 
@@ -293,17 +314,13 @@ class _WeighedRecord:
         joined = self._run.in_band(_recorded(car, begun, self._run))
         return self._weighed(joined.reshape(-1, self._run.count)[:, self._counted])
 
-    def usual(self, columns: Array) -> Array:
-        """Sizes (2 n,) of a state whose columns (m, 2 n) are as large as what was measured."""
-        seen = np.linalg.norm(columns, axis=0)
-        return np.divide(np.linalg.norm(self.measured), seen, out=np.zeros_like(seen), where=seen > 0)
-
-    def step(self, columns: Array, left: Array) -> Array:
-        """The change of the state (2 n,) that makes up for what is left (m,)."""
-        usual = self.usual(columns)
-        return np.asarray(usual * np.linalg.lstsq(columns * usual, left, rcond=_UNSEEN)[0])
+    def misfit(self, predicted: Array, memories: Array) -> float:
+        """Minus twice the log-likelihood of what was predicted (m,), with noise of any level, and of memories (k,)."""
+        return len(predicted) * float(np.log(np.sum((self.measured - predicted) ** 2))) + float(memories @ memories)
 
     def _weighed(self, samples: Array) -> Array:
+        if not samples.size:
+            return np.empty(0)
         return np.asarray((samples - samples.mean(axis=1, keepdims=True)) / self._sizes).ravel()
 
 

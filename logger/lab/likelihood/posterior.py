@@ -161,7 +161,8 @@ class Posterior:
         """Changes (n,) of the predictions, per run, by noise like what is still in the measured input of a rig, signals
         joined: what the model makes of it in each. One draw of the noise by its number."""
         tracks = [one.track for one in self.runs.runs]
-        noisy = [one.with_noise_left(draw) if isinstance(one, Excitation) and one.is_noisy else one for one in tracks]
+        noisy = [one.with_noise_left(draw, index) if isinstance(one, Excitation) and one.is_noisy else one
+                 for index, one in enumerate(tracks)]  # repeats have noise of their own
         if all(one is other for one, other in zip(noisy, tracks, strict=True)):
             return [np.zeros_like(one) for one in state.predictions]
         car, error_m = self.car(state.effects, state.logs), self.distance_error_m(state.record)
