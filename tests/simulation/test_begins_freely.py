@@ -110,3 +110,23 @@ def test_a_car_that_hardly_differs_begins_a_step_away(effects: tuple[Chosen, ...
     assert left @ (near - before) == pytest.approx(left @ (alone - before), rel=0.05)
     if HUNG in effects:
         assert runs.predict(stiffer, near=runs.beginnings(compose(MASS, (CUBIC,))))[0] == pytest.approx(alone)
+
+
+def test_a_memory_of_which_its_record_shows_nothing_stays_at_rest() -> None:
+    """What a part at 15 Hz remembered is gone before the first sample that counts: no noise is taken for it."""
+    rate_hz, time_s = 500.0, np.arange(1000) / 500.0
+    place_m = 0.01 * np.sin(2 * np.pi * 15 * time_s)
+    rate_mps = 0.3 * np.pi * np.cos(2 * np.pi * 15 * time_s)
+    force_n = 1800 * rate_mps + 500 * np.sign(rate_mps) + np.random.default_rng(1).normal(0, 20, len(time_s))
+    nothing = np.zeros((2, len(force_n)))
+    run = Run("part", rate_hz, force_n, *nothing, Excitation(rate_hz, place_m, moves_part=True), 0.1,
+              RecordFacts(main=Signal("force_n", "force", "front_suspension")))
+    part = Vehicle("part", "component", 0.0, None, Axle(0.0, 0.0, 0.0, 1500.0, 0.0), None, 0.0)
+    memory = Chosen(shipped_effects()["hysteresis"], {
+        "yield_force_n": 300.0, "yield_travel_m": 5e-4, "sharpness_ratio": 1.0, "axle": 0.0})
+    runs, car = SimulatedRuns([run]), compose(part, (memory,))
+    (begins,) = runs.beginnings(car)
+    assert begins is not None and np.abs(begins.state).max() < 1e-2
+    stiffer = compose(Vehicle("other", "component", 0.0, None, Axle(0.0, 0.0, 0.0, 1530.0, 0.0), None, 0.0), (memory,))
+    (before,), (alone,), (near,) = runs.predict(car), runs.predict(stiffer), runs.predict(stiffer, near=[begins])
+    assert (near - before)[50:] == pytest.approx((alone - before)[50:], abs=1e-3 * np.ptp(alone - before))

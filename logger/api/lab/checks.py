@@ -244,8 +244,6 @@ def _other_units_on_rig(model: CarModel, runs: SimulatedRuns, predictions: Seque
 def _other_units_of_signals(runs: SimulatedRuns, predictions: Sequence[Array]) -> Iterator[str]:
     """Which further signals were written in another unit, that differs by more than any missing effect makes them do.
     """
-    import numpy as np
-
     for run, prediction in zip(runs.runs, predictions, strict=True):
         for signal, read, model in zip(run.signals, run.more, prediction.reshape(-1, run.count)[1:], strict=True):
             moved = float(model[run.first:].std())
