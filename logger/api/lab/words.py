@@ -170,8 +170,8 @@ def error_words(steps: Sequence[ErrorStep], floor: float) -> list[str]:
     lines = [f"NRMSE on {JUDGED_ON}: {each}. Noise floor: about {error_and_fit(floor)}."]
     if rises := rising(steps):
         said = enumerated([_ERROR_WORDS.get(one, one) for one in rises], "and")
-        lines.append(f"It rises {said}: the NRMSE counts all frequencies alike, while a fit weighs each by its noise. "
-                     "The fit gains where there is little noise and loses where there is much.")
+        lines.append(f"It rises {said}: what fits the other stretches need not fit those held out. On roads a fit also "
+                     "weighs each frequency by its noise, while the NRMSE counts all alike.")
     return lines
 
 
