@@ -68,9 +68,9 @@ def numbers_of(one: Chosen) -> str:
 
 def _with_unit(value: float, error: float | None, name: str, inside: bool) -> str:
     """A number with its unit; one ``inside`` its range of which nothing is known is said to be so, and one that was
-    fitted and came to an end of it."""
+    fitted and came to an end of it, which 0 is by nature."""
     unseen = "" if error is None or error < inf else (
-        " (these runs do not show it)" if inside else " (the end of its range, no measured value)")
+        " (these runs do not show it)" if inside else " (the end of its range, no measured value)" if value else "")
     return f"{measured(value, error)} {unit_of(name)}".rstrip() + unseen
 
 
