@@ -316,7 +316,8 @@ class _WeighedRecord:
 
     def misfit(self, predicted: Array, memories: Array) -> float:
         """Minus twice the log-likelihood of what was predicted (m,), with noise of any level, and of memories (k,)."""
-        return len(predicted) * float(np.log(np.sum((self.measured - predicted) ** 2))) + float(memories @ memories)
+        squares = np.sum((self.measured - predicted) ** 2) + np.finfo(float).tiny
+        return len(predicted) * float(np.log(squares)) + float(memories @ memories)
 
     def _weighed(self, samples: Array) -> Array:
         if not samples.size:
