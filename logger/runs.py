@@ -308,7 +308,7 @@ class Run:
     @property
     def is_of_part(self) -> bool:
         """Whether it is of a part that its bench moves."""
-        return isinstance(self.track, Excitation) and self.track.moves_part
+        return moves_part(self.track)
 
     @property
     def at_rest(self) -> bool:
@@ -326,6 +326,11 @@ def begins_freely(track: Track | Excitation | None) -> bool:
     return isinstance(track, Excitation) and track.is_still
 
 
+def moves_part(track: Track | Excitation | None) -> bool:
+    """Whether it moves the ends of a part on its bench."""
+    return isinstance(track, Excitation) and track.moves_part
+
+
 def zero_is_known(main: Signal, track: Track | Excitation | None) -> bool:
     """Whether what a run's main signal reads at rest is known: of places it is not, nor on a rig of accelerations, as
     the zero of their sensor has nothing to do with what stands on springs or is let go."""
@@ -336,7 +341,7 @@ def zero_is_known(main: Signal, track: Track | Excitation | None) -> bool:
 def unknown_past_s(track: Track | Excitation | None) -> float:
     """How much of the beginning of a run over this road, or on this rig, is left out: ``SKIP_S``, ``PART_SKIP_S``, and
     nothing where the state that it begins in is found with the rest."""
-    return PART_SKIP_S if isinstance(track, Excitation) and track.moves_part else (
+    return PART_SKIP_S if moves_part(track) else (
         0.0 if begins_freely(track) else SKIP_S)
 
 

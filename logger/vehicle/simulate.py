@@ -12,7 +12,7 @@ import numpy as np
 from logger.arrays import Array, Complex
 from logger.dsp.filters import kaiser_half_length, low_pass_taps
 from logger.profiles.track import Way, WheelTracks
-from logger.vehicle.structure import Forces, Structure, pushed
+from logger.vehicle.structure import AT_REST, Forces, Structure, pushed
 
 FINE_RATE_HZ = 1000.0
 """A car is simulated in at least so many steps a second."""
@@ -90,7 +90,7 @@ class Passage:
     ValueError unless there are two or more finite distances.
     """
 
-    begins = np.empty(0)
+    begins = AT_REST
     """By how much the state (2 n,) that it begins in, then those of laws with a memory (k,), differ from rest; empty:
     not at all."""
 

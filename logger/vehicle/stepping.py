@@ -25,7 +25,7 @@ from logger.arrays import Array
 from logger.profiles.track import Way
 from logger.units import STANDARD_GRAVITY_MPS2
 from logger.vehicle.laws import MOST_MEMORY, CornerLaws, Law, Law2
-from logger.vehicle.structure import BASE_INPUTS, Structure, straight_step
+from logger.vehicle.structure import AT_REST, BASE_INPUTS, Structure, straight_step
 
 if TYPE_CHECKING:
     from logger.vehicle.stepping_loop import Asked
@@ -46,9 +46,6 @@ class Motion:
 
     states: Array
     forces: Array
-
-
-AT_REST = np.empty(0)
 
 
 def begun(at_rest: Array, begins: Array) -> Array:

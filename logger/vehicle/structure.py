@@ -269,6 +269,8 @@ def assemble(body_inertias: Sequence[float], corners: Sequence[Corner], contact_
     )
 
 
+AT_REST = np.empty(0)
+"""How states differ from those at rest: not at all."""
 BASE_INPUTS = ("height", "velocity", "acceleration")
 """What a mass on a base is driven by, in the order of its ``Structure.road``."""
 

@@ -23,6 +23,7 @@ from logger.api.lab.checks import check_model, check_moves, checked_runs, predic
 from logger.api.lab.question import LabQuestion
 from logger.api.question import TOLERANCE, UNKNOWN, Notify, Runs, WrongOption, each, silent
 from logger.api.vehicles import model_of
+from logger.arrays import Array
 from logger.errors import BadInput
 from logger.lab.compare import LabComparison, compare
 from logger.lab.diagnosis import LabDiagnosis, diagnose, refit
@@ -33,7 +34,7 @@ from logger.lab.selection.add_effect import AddedEffects, add
 from logger.lab.selection.candidate_fit import fit_roughly, refine
 from logger.lab.selection.screening import misalignment, screen
 from logger.profiles.excitation import Excitation
-from logger.runs import Array, Run, are_on_rig
+from logger.runs import Run, are_on_rig
 from logger.shipped import vehicle_path
 from logger.simulation.virtual_drive import SEARCH_HZ, SimulatedRuns
 from logger.store.formats import drive_file, effect_file
@@ -219,8 +220,8 @@ def bench_of(word: str, model: CarModel, runs: SimulatedRuns, effect_files: Sequ
     """
     scales = _scales(word, model, runs)
     effects, files = known_effects(model, effect_files, are_on_rig(runs.runs), scales)
-    last = {name: sized(one, model.vehicle, scales) for name, one in effect_file.shipped_effects().items()
-            if one.sought_last and name not in effects}
+    last = _ready_for(model, are_on_rig(runs.runs), scales, {
+        name: one for name, one in effect_file.shipped_effects().items() if one.sought_last and name not in effects})
     if searches is not None:
         require_compiler(searches, effects.values())
     found = Bench(word, model, runs, effects, files, tolerance, last)
@@ -283,23 +284,31 @@ def known_effects(model: CarModel, files: Sequence[str], on_rig: bool = False, s
     on_rig    as ``sought_effects``
     scales    as ``sized``
     """
-    of_part = model.vehicle.model == "component"
-    sought, own = sought_effects(on_rig, of_part), dict[str, str]()
-    effects = {name: sized(_shown_on_rig(one.on(model.vehicle), of_part) if on_rig else one, model.vehicle, scales)
-               for name, one in sought.items()}
+    own = dict[str, str]()
+    effects = _ready_for(model, on_rig, scales, sought_effects(on_rig, _is_part(model)))
     for one in model.effects:
         if one.file is not None:
             effects[one.effect.name], own[one.effect.name] = one.effect, one.file
     for file in files:
-        is_shipped = file in effect_file.shipped_effects()
-        effect = (sized(effect_file.shipped_effects()[file], model.vehicle, scales) if is_shipped else
-                  own_effect(Path(file)))
+        shipped = effect_file.shipped_effects().get(file)
+        effect = own_effect(Path(file)) if shipped is None else _ready_for(model, on_rig, scales, {file: shipped})[file]
         if effect.name in effects:
             raise BadInput(f"--effect-file {file}: expected each effect once, found {effect.name} again")
         effects[effect.name] = effect
-        if not is_shipped:
+        if shipped is None:
             own[effect.name] = file
     return effects, own
+
+
+def _is_part(model: CarModel) -> bool:
+    return model.vehicle.model == "component"
+
+
+def _ready_for(model: CarModel, on_rig: bool, scales: Scales | None, effects: Mapping[str, Effect]
+               ) -> dict[str, Effect]:
+    """Effects in the model's sizes, with advice that can be followed there."""
+    return {name: sized(_shown_on_rig(one.on(model.vehicle), _is_part(model)) if on_rig else one, model.vehicle, scales)
+            for name, one in effects.items()}
 
 
 def _shown_on_rig(effect: Effect, of_part: bool) -> Effect:

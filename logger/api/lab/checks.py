@@ -16,6 +16,7 @@ from statistics import median
 import numpy as np
 
 from logger.api.vehicles import check_forces
+from logger.arrays import Array, Bools
 from logger.bounds import SPEED, time_hint
 from logger.dsp.channel_faults import goes_against, longest_still, share_at_ends
 from logger.dsp.repeated_samples import find_repeats, stretches_of
@@ -46,11 +47,10 @@ from logger.runs import (
     NO_READING,
     READING,
     SKIP_S,
-    Array,
-    Bools,
     Run,
     Signal,
     begins_freely,
+    moves_part,
     unknown_past_s,
     zero_is_known,
 )
@@ -441,7 +441,7 @@ def least_s(drive: Drive, vehicle: Vehicle | None = None) -> float:
     if begins_freely(track):
         slowest_hz = 0.0 if vehicle is None else float(undamped_frequencies_hz(structure_of(vehicle))[0])
         return min(_LEAST_PERIODS / slowest_hz, LEAST_S) if slowest_hz else 0.0
-    return _LEAST_OF_PART_S if getattr(track, "moves_part", False) else LEAST_S
+    return _LEAST_OF_PART_S if moves_part(track) else LEAST_S
 
 
 def check_decay(drive: Drive, file: Path) -> None:
