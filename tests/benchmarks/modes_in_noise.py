@@ -32,7 +32,7 @@ def main() -> int:
                                 abs(mode.damping_ratio - ratio) / max(mode.damping_std, 1e-6)))
         within = 100 * (np.array(off) < 2).mean(axis=0)
         print(f"{method}: {count} records, {found} modes found, {missed} missed, {invented} that are not there")
-        figures.at_most(f"{method}: modes that are not there", invented, 0, "")
+        figures.at_most(f"{method}: false modes", invented, 0, "")
         figures.at_most(f"{method}: modes missed", missed, {"n4sid": 12, "ssi": 20}[method], "")
         for what, share in zip(("frequency", "damping"), within.tolist(), strict=True):
             figures.at_least(f"{method}: {what} within 2 sd", share, 88, "%")

@@ -78,23 +78,23 @@ def _t2_2(effort: Workload) -> Result:
         if upper is not None and ours is not None:
             values += about(("Table 2.2", "Fig 2.5"), [
                 Value(f"class {name}, upper limit [cm3]", upper, ours, 1e-6 * upper)])
-    values += about("Table 2.2", [Value("power of a metre in the unit of Gd", printed_power, _power_of_a_metre(), 0.01,
-                                        Word.MISPRINT)])
+    values += about("Table 2.2", [Value("exponent of the metre in the unit of Gd", printed_power, _power_of_a_metre(),
+                                        0.01, Word.MISPRINT)])
     table = Table(f"Classes, and {roads} generated roads of each geometric mean", (
         Column("class"), Column("printed lower [cm3]", ".0f"), Column("printed mean [cm3]", ".0f"),
         Column("printed upper [cm3]", ".0f"), Column("our upper [cm3]", ".1f"),
         Column("Gd(n0) found in the roads [cm3]", ".4g"), Column("waviness found", ".3f"),
-        Column("put into the right class [%]", ".0f")), tuple(rows))
+        Column("correctly classified [%]", ".0f")), tuple(rows))
     verdict = ("All limits and means agree. The printed unit, 1e-6 m2 (cycle/m), is a misprint: a displacement "
-               "spectrum is in m2 per cycle/m, that is m3, and 1e-6 of it are cm3. Roads that were generated at each "
-               "mean are found again with their degree of roughness, a waviness near 2 and their class. The power of "
-               "a metre is that by which the spectrum of a road grows when all its lengths are doubled.")
+               "spectrum is in m2 per cycle/m, or m3, and 1e-6 m3 is 1 cm3. For roads generated at each mean, ridelog "
+               "finds the degree of roughness, a waviness near 2 and the class. The exponent of the metre is the "
+               "power of 2 by which a road's spectrum grows when all its lengths are doubled.")
     n = np.array([LOWEST_CPM, HIGHEST_CPM])
     picture = Picture(Curves("Bounds of the classes, waviness 2", "wave number [cycle/m]", "displacement spectrum [m3]",
                              tuple(Line(f"upper limit of {name}", n, displacement_psd(n, limit))
                                    for name, limit in zip(CLASS_GD_N0_CM3, limits, strict=False)), log_x=True,
                              log_y=True),
-                      "the bounds of the classes over the spectrum, within the wave numbers of interest")
+                      "limits of the classes in a plot of the spectrum against wave number")
     return Result((table,), verdict, (picture,), tuple(values))
 
 
@@ -116,11 +116,11 @@ def _limit(smoother: tuple[str, float], rougher: tuple[str, float]) -> float:
 
 
 T2_2 = Study("table_2_2", "The classes of ISO 8608, and roads of each", "Table 2.2, section 2.2.1",
-              "The limits are those at which ridelog's word for a road changes; roads of 1 km are generated at each "
+              "The limits are those at which ridelog changes the class of a road; roads of 1 km are generated at each "
               "class's geometric mean and classified from their elevations alone.", _t2_2,
               items=(Item("Table 2.2", Word.MISPRINT,
                           "All limits agree; the printed unit should be 1e-6 m2 per cycle/m, which is cm3."),
-                     Item("Fig 2.5", Word.AGREES, "Its bounds are the limits of the table, at waviness 2.")))
+                     Item("Fig 2.5", Word.AGREES, "The plotted limits are those of the table, at waviness 2.")))
 
 
 PRINTED_RANGES = (("airport runways and superhighways", 0.25, 1.75), ("new pavements", 1.50, 3.25),
@@ -159,17 +159,17 @@ def _t2_3(effort: Workload) -> Result:
     values += about("2.2.2.3 targets", [
         Value(f"{word} up to [m/km]", printed, float(iri[[one == word for one in federal]].max()), 0.005)
         for word, printed in printed_federal])
-    verdict = ("All bounds agree. Table 2.4 writes its descriptions along a scale; each is taken to hold from the "
-               "mark at which it stands up to the next, the first from 0. The targets of the text, 1.50 and 2.68 m/km, "
-               "are 95 and 170 in/mi, between which a road of the federal system is called fair today.")
+    verdict = ("All limits agree. Table 2.4 prints its descriptions along a scale; here each applies from its mark up "
+               "to the next one, and the first from 0. The targets in the text, 1.50 and 2.68 m/km, are 95 and 170 "
+               "in/mi, the limits between which US federal practice calls a road fair.")
     picture = Picture(Curves("Which roads have it", "IRI [m/km]", "kind of road, as in the table", tuple(lines)),
                       "the ranges of six kinds of road as Sayers and Karamihas (1998) draw them, those of Table 2.3")
     return Result((ranges, rides), verdict, (picture,), tuple(values))
 
 
-T2_3 = Study("table_2_3", "Which roads have which IRI, and how they ride", "Table 2.3, section 2.2.2.3",
-              "Ridelog is asked for its words from 0 to 25 m/km in steps of 0.001; the values at which they change "
-              "stand beside the printed ones.", _t2_3,
+T2_3 = Study("table_2_3", "IRI of kinds of road, and how they ride", "Table 2.3, section 2.2.2.3",
+              "ridelog describes each IRI from 0 to 25 m/km in steps of 0.001; the values at which the description "
+              "changes are compared with the printed ones.", _t2_3,
               items=(*alike(("Table 2.3", "Fig 2.16"), Word.AGREES,
                             "Each kind of road begins and ends at the printed IRI."),
                      Item("Table 2.4", Word.AGREES, "The description of the ride changes at the printed marks."),
@@ -201,7 +201,8 @@ def _f2_7(effort: Workload) -> Result:
             Value(f"class {name} road, Gd(n0) [cm3]", gd, found.gd_n0_cm3, gd / 2)])
         values += about(SPECTRA[name], [Value(f"class {name} road, waviness", 2.0, found.waviness, 0.15)])
         values += about(SPECTRA[name], [
-            Statement(f"class {name}: scatter of the smoothed over that of the raw spectrum", "smoothed, it is easier "
+            Statement(f"class {name}: scatter of the smoothed spectrum over scatter of the raw one",
+                      "smoothed, it is easier "
                       "to put into a class", scatter[1] / scatter[0], most=0.5)])
         levels.append(bands.psd_m3)
         thin = slice(None, None, 4)
@@ -210,31 +211,33 @@ def _f2_7(effort: Workload) -> Result:
         shown = np.arange(0, 100.0, 0.25)
         roads.append(Line(f"class {name}", shown, 1000 * np.interp(shown, spacing_m * np.arange(len(road)), road)))
     values += about(tuple(SPECTRA.values()), [Statement(
-        "least of all bands' ratios of the spectra, class D over class B", "shifted upward at all wave numbers",
+        "smallest ratio of the spectra in any band, class D over class B", "shifted upward at all wave numbers",
         float((levels[1] / levels[0]).min()), least=1.0)])
     table = Table("Two roads, classified from their elevations", (
         Column("printed class"), Column("our class"), Column("its mean Gd(n0) [cm3]", ".0f"),
         Column("Gd(n0) found [cm3]", ".1f"), Column("waviness found", ".3f"),
         Column("scatter of the raw spectrum [dB]", ".1f"), Column("of the smoothed [dB]", ".2f")), tuple(rows))
-    verdict = ("As the text says of the printed pictures, the rough road's spectrum is that of the smooth one shifted "
-               "upward at all wave numbers, both fall towards short waves, the raw spectra are ragged, and smoothed "
-               f"over the bands of Eq 2.4 to 2.6 they scatter by {scatters[0][1]:.1f} dB in place of "
-               f"{scatters[0][0]:.1f}. The text says that the bands are listed in ISO 2631-1; they are in ISO 8608. "
-               "The printed phases are not known, so the roads are alike in their statistics only.")
+    verdict = ("As the text describes: the rough road's spectrum lies above the smooth one's at all wave numbers, and "
+               "both fall towards short waves. The raw spectra are ragged; smoothing over the bands of Eq 2.4 to 2.6 "
+               f"reduces their scatter from {scatters[0][0]:.1f} to {scatters[0][1]:.1f} dB. The text says that the "
+               "bands are listed in ISO 2631-1; they are in ISO 8608. The printed phases are not known, so only the "
+               "statistics of the roads can agree.")
     pictures = (Picture(Curves("The first 100 m of a smooth and a rough road (Fig 2.6, 2.8)", "distance [m]",
                                "elevation [mm]", tuple(roads)),
-                        "a picture each: a simulated smooth profile, and a rough one"),
+                        "two figures: a simulated smooth profile and a rough one"),
                 Picture(Curves("Their spectra (Fig 2.7, 2.9)", "wave number [cycle/m]", "displacement spectrum [m3]",
                                tuple(lines), log_x=True, log_y=True),
-                        "a picture each, raw and smoothed: falling towards short waves, the rough road's shifted "
-                        "upward at all wave numbers"))
+                        "two figures, raw and smoothed: both spectra fall towards short waves, and the rough road's "
+                        "lies above the other at all wave numbers"))
     return Result((table,), verdict, pictures, tuple(values))
 
 
 F2_7 = Study("fig_2_7", "Spectra of a smooth and a rough road, raw and smoothed", "Fig 2.7, section 2.2.1",
              "Random roads of 1 km at the geometric means of classes B and D, as the captions have them.", _f2_7,
-             items=(*alike(PROFILES.values(), Word.AGREES, "A road made for the caption's class is found to be of it."),
-                    *alike(SPECTRA.values(), Word.AGREES, "The spectra fall, shift and smooth as the text describes.")))
+             items=(*alike(PROFILES.values(), Word.AGREES,
+                           "A road generated for the caption's class is classified as that class."),
+                    *alike(SPECTRA.values(), Word.AGREES,
+                           "The spectra fall, differ and become smooth as the text describes.")))
 
 
 NAMES = ("f1", "f2", "f3", "f4", "Q4", "f5", "Q5", "f6", "Q6")
@@ -262,15 +265,15 @@ def _t2_7(effort: Workload) -> Result:
             else:
                 rows.append((weighting.name, name, "infinite" if said else "none",
                              "without effect" if said is None else "infinite" if mine == inf else f"{mine:g}"))
-    absent = Table("Parts that a weighting does not have", (
+    absent = Table("Sections that a weighting lacks", (
         Column("weighting"), Column("parameter"), Column("printed"), Column("ours")), tuple(rows))
-    verdict = (f"All {len(values)} finite parameters agree, and the parts that the tables leave out, by an infinite "
-               "frequency, are left out here. What the formula does with them is in fig-2-18.")
+    verdict = (f"All {len(values)} finite parameters agree. Sections that the tables omit, by an infinite frequency, "
+               "are omitted here too. Study fig-2-18 evaluates the formula with them.")
     return Result((absent,), verdict, (), tuple(values))
 
 
 T2_7 = Study("table_2_7", "Parameters of the six frequency weightings", "Table 2.7, section 2.3.4.1",
-              "Ridelog's weightings, each as its file has it, parameter by parameter.", _t2_7,
+              "The parameters in ridelog's weighting files, one by one.", _t2_7,
               items=(Item("Table 2.7", Word.AGREES, "Every parameter of Wk, Wd and Wf agrees."),
                      Item("Table 2.8", Word.AGREES, "Every parameter of Wc, We and Wj agrees.")))
 
@@ -291,12 +294,12 @@ def _f2_13(effort: Workload) -> Result:
     table = Table("Where the gain peaks", (
         Column("motion"), Column("printed [cycle/m]", ".3f"), Column("ours [cycle/m]", ".4f"),
         Column("wavelength [m]", ".1f"), Column("gain", ".2f")), rows)
-    verdict = ("Both peaks lie within 4 % of where the text has them, as near as a broad hump is read off a figure. "
-               "The text has their meaning the wrong way round: at 0.065 cycle/m the body bounces, at 0.42 the wheel "
-               "hops; at 80 km/h these are its 1.44 and 9.33 Hz.")
+    verdict = ("Both peaks lie within 4 % of the printed wave numbers, which is as closely as a broad peak can be "
+               "read off a figure. The text swaps their meaning: at 0.065 cycle/m the body bounces, at 0.42 the wheel "
+               "hops. At 80 km/h these are 1.44 and 9.33 Hz.")
     picture = Picture(Curves("Gain of the IRI's car at 80 km/h, slope of the suspension per slope of the road",
                              "wave number [cycle/m]", "gain", (Line("gain", wave_number, gain),), log_x=True),
-                      "the IRI of sine waves of 0.1 to 100 m, largest at two wave numbers, 0.065 and 0.42 cycle/m")
+                      "the IRI of sine waves of 0.1 to 100 m, with peaks at 0.065 and 0.42 cycle/m")
     values = (*(Value(f"{words} peak [cycle/m]", printed, float(wave_number[peak]), near_share * printed)
                 for words, printed, peak in zip(("first", "second"), printed_peaks_cpm, peaks, strict=True)),
               *(Value(f"where the {words} [cycle/m]", printed, near, near_share * printed, Word.MISPRINT)
@@ -307,7 +310,7 @@ def _f2_13(effort: Workload) -> Result:
     return Result((table,), verdict, (picture,), values)
 
 
-F2_13 = Study("fig_2_13", "What the IRI hears of each wavelength", "Fig 2.13, section 2.2.2.1",
+F2_13 = Study("fig_2_13", "Response of the IRI to each wavelength", "Fig 2.13, section 2.2.2.1",
               "Computed for the Golden Car as a continuous system, without the moving average, as in the figure.",
               _f2_13,
               items=(Item("Fig 2.13", Word.MISPRINT,
@@ -346,11 +349,11 @@ def _f2_18(effort: Workload) -> Result:
     table = Table("The curves (printed as pictures only)", (
         Column("weighting"), Column("largest at [Hz]", ".3g"), Column("there [dB]", "+.2f"),
         Column("within 3 dB of it from [Hz]", ".3g"), Column("to [Hz]", ".3g")), rows)
-    verdict = ("The curves meet the standard's factors to the printed digit. Eq 2.16 does not: its right side has f5 "
-               "and Q5 in the denominator, too, and is then 1 at all frequencies, which would make Wk at 1 Hz twice "
-               "as large; f6 and Q6 belong there. The text says of the printed figures only that they have amplitude "
-               "against frequency; here Wk is level at half its height about 1 Hz and highest at 6 Hz, Wd is highest "
-               "at 1 Hz and Wf at 0.17 Hz.")
+    verdict = ("The curves agree with the standard's factors to the printed digit. Eq 2.16 as printed does not: its "
+               "denominator has f5 and Q5, like its numerator, so it is 1 at all frequencies, and Wk at 1 Hz would be "
+               "twice as large. The denominator needs f6 and Q6. Of the figures the text says only that they plot "
+               "amplitude against frequency. Here Wk has a plateau of half its maximum near 1 Hz and its maximum at 6 "
+               "Hz; Wd has its maximum at 1 Hz, Wf at 0.17 Hz.")
     pictures = tuple(Picture(Curves(title, "frequency [Hz]", "factor [dB]", tuple(
         Line(name, f_hz[levels[name] > -60], levels[name][levels[name] > -60]) for name in names), log_x=True),
         f"amplitude by frequency of the {printed}") for title, names, printed in (
@@ -377,14 +380,13 @@ def _second_order(f_hz: float, corner_hz: float, q: float) -> float:
 
 
 F2_18 = Study("fig_2_18", "Curves of the six frequency weightings", "Fig 2.18, section 2.3.4.1",
-              "The magnitude of the formulas of ISO 2631-1 Annex A, as ridelog weighs whole records.", _f2_18,
+              "The magnitude of the formulas of ISO 2631-1 Annex A, which ridelog applies to whole records.", _f2_18,
               items=(Item("Fig 2.18", Word.AGREES,
-                          "The principal weightings have the standard's factors to the printed digit."),
+                          "The principal weightings agree with the standard's factors to the printed digit."),
                      Item("Fig 2.19", Word.AGREES,
                           "The additional weightings are those of Eq 2.13 to 2.15 with the parameters of Table 2.8."),
                      Item("Eq 2.16", Word.MISPRINT,
-                          "Its right side has f5 and Q5 where the denominator needs f6 and Q6, and is then the same "
-                          "at all frequencies.")))
+                          "Its denominator has f5 and Q5 where it needs f6 and Q6, so it is 1 at all frequencies.")))
 
 
 def _f2_20(effort: Workload) -> Result:
@@ -406,8 +408,8 @@ def _f2_20(effort: Workload) -> Result:
     values = (Value("dose of the upper line, n = 4 [m/s^1.75]", 8.5, upper, 0.01, Word.MISPRINT),
               Value("dose of the lower line, n = 4 [m/s^1.75]", 17.0, lower, 0.01, Word.MISPRINT),
               Value("where the lines cross: middle of the shaded hours", 6.0, crossing, 2.0))
-    verdict = ("The text has 8.5 for the upper line and 17 for the lower; it is the other way round. The lines of the "
-               f"two schools, a^2 t and a^4 t constant, cross at {crossing:.1f} hours and lie within "
+    verdict = ("The text swaps the doses: 17 belongs to the upper line, 8.5 to the lower. The lines of constant a^2 t "
+               f"and constant a^4 t cross at {crossing:.1f} hours and lie within "
                f"{100 * np.abs(np.log(apart[(fine >= 4) & (fine <= 8)])).max():.0f} % of each other from 4 to 8 hours, "
                "which is where the printed figure is shaded; at 10 minutes those of n = 2 are "
                f"{apart[np.searchsorted(fine, 1 / 6)]:.1f} times as high.")
@@ -422,10 +424,9 @@ def _f2_20(effort: Workload) -> Result:
 
 
 F2_20 = Study("fig_2_20", "The health guidance caution zone", "Fig 2.20, section 2.3.5",
-              "The zone's bounds as ridelog has them for an exposure of a minute to a day; the doses of its lines are "
-              "those of ISO 2631-1 Eq B.3.", _f2_20,
+              "The limits of the zone in ridelog, for exposures from a minute to a day; the doses follow from ISO "
+              "2631-1 Eq B.3.", _f2_20,
               items=(Item("Fig 2.20", Word.MISPRINT,
-                          "The text has the doses of the two lines the wrong way round: 17 is the upper, 8.5 the "
-                          "lower."),))
+                          "The text swaps the doses of the two lines: 17 is the upper one, 8.5 the lower."),))
 
 STUDIES = (T2_2, T2_3, F2_7, T2_7, F2_13, F2_18, F2_20)

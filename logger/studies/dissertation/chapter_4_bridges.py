@@ -70,18 +70,18 @@ def _f4_30(effort: Workload) -> Result:
     shaken_s = float(time_s[np.abs(accel) > still * max(peaks)].max()) - front_s
     table = Table("A step of 38.1 mm at 48.3 km/h (printed as a picture only)", (
         Column("rear axle behind the front [s]", ".3f"), Column("peak from the front axle [m/s2]", ".2f"),
-        Column("from the rear axle [m/s2]", ".2f"), Column("shaken for [s]", ".1f")),
+        Column("from the rear axle [m/s2]", ".2f"), Column("duration of the response [s]", ".1f")),
         ((wheelbase_m / BRIDGE_MPS, *peaks, shaken_s),))
-    verdict = (f"Two steps, {wheelbase_m / BRIDGE_MPS:.2f} s apart, and two blows that the body swings out "
-               f"of within {shaken_s:.1f} s. Height and speed of the printed figure are not given, nor "
-               "what it looks like; those of the analysis that follows it are taken.")
+    verdict = (f"Two steps, {wheelbase_m / BRIDGE_MPS:.2f} s apart, and two impacts; the body's motion decays within "
+               f"{shaken_s:.1f} s. The source does not give the height and speed of this figure; those of the analysis "
+               "that follows are used.")
     pictures = (Picture(Curves("Input", "time [s]", "elevation under the tire [mm]", tuple(
         Line(name, time_s, 1000 * bridge(step_at_m, STEP_M)(record.distance_m - behind_m))
         for name, behind_m in (("front", 0.0), ("rear", wheelbase_m)))), "the step as the input of the model"),
         Picture(Curves("Output", "time [s]", "acceleration [m/s2]", (Line("body", time_s, accel),)),
                 "the simulated response to it"))
     later_s = _blow_s(accel, time_s, ~front) - _blow_s(accel, time_s, front)
-    values = (Statement("second blow behind the first, over wheelbase by speed", "a step as the input of both axles",
+    values = (Statement("delay of the second impact, over wheelbase by speed", "a step as the input of both axles",
                         later_s * BRIDGE_MPS / wheelbase_m, 0.9, 1.1, Word.NOT_REPRODUCIBLE),
               Statement("share of the acceleration's energy within 1 s of the step", "easily located by the response",
                         float(np.sum(accel[(time_s >= front_s) & (time_s < front_s + 1)] ** 2) / np.sum(accel**2)), 0.9,
@@ -110,9 +110,9 @@ def _f4_31(effort: Workload) -> Result:
     white, masses = (np.array(ends) for ends in zip(*([_mass(record, height, ours) for ours in (False, True)]
                                                       for height in effort.each(heights)), strict=True))
     in_proportion = TRUTH[MASS] * np.array(heights) / STEP_M
-    table = Table("Mass, by the height that the step is taken for", (
-        Column("height taken [mm]", ".2f"), Column("printed: in proportion [kg]", ".1f"),
-        Column("ours, what is left taken for white noise [kg]", ".1f"),
+    table = Table("Mass found for each assumed height of the step", (
+        Column("assumed height [mm]", ".2f"), Column("printed: in proportion [kg]", ".1f"),
+        Column("ours, residual as white noise [kg]", ".1f"),
         Column("ours, innovations form [kg]", ".1f")),
         tuple(zip((1000 * np.array(heights)).tolist(), in_proportion.tolist(), white.tolist(), masses.tolist(),
                   strict=True)))
@@ -126,14 +126,14 @@ def _f4_31(effort: Workload) -> Result:
          one.parameters.get(MASS), one.standard_errors.get(MASS))
         for words, one in (("the mass, 875 kg", known), ("neither mass nor height", both))))
     powers = [float(np.polyfit(np.log(heights), np.log(ends), 1)[0]) for ends in (white, masses)]
-    verdict = ("Exact at 38.1 mm and on a line, as printed, but not quite in proportion: the mass goes as the power "
-               f"{powers[0]:.2f} of the height that is taken, {powers[1]:.2f} in the innovations form, for it also "
-               "sets how fast the body swings back. That is what lets ours find both at once, "
+    verdict = ("As printed, the mass is exact at 38.1 mm and rises along a line, but not quite in proportion: it "
+               f"varies as the power {powers[0]:.2f} of the assumed height, {powers[1]:.2f} in the innovations form, "
+               "because the mass also sets how fast the body swings back. That is why ours can find both at once, "
                f"{both.parameters[MASS]:.0f} ± {both.standard_errors[MASS]:.0f} kg and "
                f"{1000 * both.parameters['step.height_m']:.1f} ± {1000 * both.standard_errors['step.height_m']:.1f} "
-               "mm, on a road without roughness. With the mass known, the car measures the step, as the source "
-               "proposes. Its 48.3 m/s are 48.3 km/h.")
-    picture = Picture(Curves("Mass, by the height that a step of 38.1 mm is taken for", "height taken [mm]",
+               "mm, on a road without roughness. With a known mass, the car measures the step, as the source "
+               "proposes. The printed 48.3 m/s should be km/h.")
+    picture = Picture(Curves("Mass found for each assumed height of a step of 38.1 mm", "assumed height [mm]",
                              "mass [kg]", (Line("white noise", 1000 * np.array(heights), white),
                                            Line("innovations form", 1000 * np.array(heights), masses),
                                            Line("in proportion", 1000 * np.array(heights), in_proportion, dots=True)),
@@ -143,11 +143,10 @@ def _f4_31(effort: Workload) -> Result:
     values: tuple[Check, ...] = (*about("Fig 4.31", [Value("mass at the true height, 38.1 mm [kg]", TRUTH[MASS], exact,
                                         0.01 * TRUTH[MASS])]),
               *about("Fig 4.31", [
-                  Statement("correlation of mass and height taken, their way", "linearly proportional",
+                  Statement("correlation of mass and assumed height, the source's way", "linearly proportional",
                             float(np.corrcoef(heights, white)[0, 1]), 0.99),
-                  Statement("error of the mass with the height estimated, over its standard error", "the mass cannot "
-                                                                                                    "be predicted "
-                                                                                                    "without the "
+                  Statement("error of the mass with the height estimated, over its standard error",
+                            "the mass cannot be predicted without the "
                                                                                                     "height",
                             (both.parameters[MASS] - TRUTH[MASS]) / both.standard_errors[MASS], -3.0, 3.0, Word.BETTER),
                   Statement("standard error of that mass [%]", "large amounts of error",
@@ -166,13 +165,13 @@ def _mass(record: Run, height_m: float, ours: bool) -> float:
                   RoadInput(step=RoadStep(_STEP_AT_M_F4_31, height_m))).parameters[MASS]
 
 
-F4_31 = Study("fig_4_31", "Mass by the height that a bridge's step is taken for", "Fig 4.31, section 4.4.5",
+F4_31 = Study("fig_4_31", "Mass against the assumed height of a bridge's step", "Fig 4.31, section 4.4.5",
               "Simulated as in the source: a step of 38.1 mm at 48.3 km/h, no roughness; sensor noise 0.05 m/s2.",
               _f4_31,
               items=(Item("Fig 4.31", Word.BETTER,
-                          "Exact at the true height and on a line as printed; ours finds mass and height together."),
+                          "Exact at the true height and linear, as printed; ours finds mass and height together."),
                      Item("4.4.5 height from a known mass", Word.AGREES,
-                          "With the mass known the step's height comes out, as the text proposes."),
+                          "With a known mass the fit gives the step's height, as the text proposes."),
                      Item("4.4.5 speed", Word.MISPRINT, "30 mph are 48.3 km/h, not m/s.")))
 
 
@@ -194,32 +193,33 @@ def _f4_32(effort: Workload) -> Result:
         (("the road without the step, printed IRI 2", iri(road, SPACING_M), peaks[1]),
          ("with the step", iri(stepped, SPACING_M), peaks[0])))
     verdict = (f"As printed, the step stands out: {peaks[0]:.1f} m/s2 against {peaks[1]:.1f} on the rest of the road. "
-               f"It alone takes the IRI of these 100 m from {table.rows[0][1]:.1f} to {table.rows[1][1]:.1f} m/km; by "
-               "the 4 m/km of the text it would still be a good bridge's end, so an average over 100 m hides it. The "
-               "roughness of the printed road is another draw.")
+               f"The step alone raises the IRI of these 100 m from {table.rows[0][1]:.1f} to {table.rows[1][1]:.1f} "
+               "m/km; by the text's limit of 4 m/km it would still be a good bridge end, so an average over 100 m "
+               "hides it. The printed road is another random draw.")
     pictures = (Picture(Curves("A step on a road of IRI 2 m/km (Fig 4.32)", "distance [m]", "elevation [mm]",
                                (Line("road", place_m[::5], 1000 * stepped[::5]),)),
                         "a smooth road that steps down by 38.1 mm"),
-                Picture(Curves("The car's answer (Fig 4.33)", "distance [m]", "acceleration [m/s2]",
+                Picture(Curves("Response of the car (Fig 4.33)", "distance [m]", "acceleration [m/s2]",
                                (Line("body", distance_m, accel),)),
-                        "the response, in which the step is clear beside the rest of the road"))
+                        "the response, in which the step stands out from the rest of the road"))
     spread = relative_spread(length_m)
     values: tuple[Check, ...] = (*about("Fig 4.32", [Value("IRI of the road without the step [m/km]", printed_iri,
                                                            iri(road, SPACING_M),
                                         printed_iri * (0.01 + 3 * spread), Word.NOT_REPRODUCIBLE)]),
-              *about("Fig 4.33", [Statement("peak at the step over the peak elsewhere", "clearly shows the effect of "
-                                                                                        "the "
+              *about("Fig 4.33", [Statement("peak at the step over the peak elsewhere",
+                                            "clearly shows the effect of the "
                                             "bump", peaks[0] / peaks[1], 2.0, word=Word.NOT_REPRODUCIBLE)]))
     return Result((table,), verdict, pictures, values)
 
 
-F4_32 = Study("fig_4_32", "A bridge's step on a smooth road, and the car's answer", "Fig 4.32, section 4.4.6",
+F4_32 = Study("fig_4_32", "A bridge's step on a smooth road, and the response of the car", "Fig 4.32, section 4.4.6",
               "Simulated as in the source: a step of 38.1 mm down at 48.3 km/h on a road of IRI 2 m/km.", _f4_32,
               items=(Item("Fig 4.32", Word.NOT_REPRODUCIBLE,
-                          "The road of the figure is another draw of chance; this one has the printed IRI within that "
-                          "chance."),
+                          "The printed road is another random draw; this one has the printed IRI within the scatter "
+                          "of such draws."),
                      Item("Fig 4.33", Word.NOT_REPRODUCIBLE,
-                          "It is the response to that road; simulated, the step stands out as described.")))
+                          "The response to that road cannot be repeated; in a simulated one, the step stands out as "
+                          "described.")))
 
 
 PRINTED_PEAK_MPS2 = 1.5
@@ -240,9 +240,9 @@ def _f4_34(effort: Workload) -> Result:
     table = Table("Largest weighted r.m.s. acceleration", (
         Column("section [m]", ".0f"), Column("printed, nearly [m/s2]", ".1f"), Column("ours [m/s2]", ".2f"),
         Column(f"least of {roads} roads", ".2f"), Column("largest", ".2f"), Column("in words")), rows)
-    verdict = (f"Of one size: up to {found[0][0].max():.2f} m/s2 per metre beside nearly 1.5. The source does not "
-               "give its road, its filter's start or how it weighs a metre, in which this car has a thirteenth of a "
-               "second; over 10 m what a person feels is already half of that.")
+    verdict = (f"Of the same size: up to {found[0][0].max():.2f} m/s2 in 1 m windows beside a printed value of nearly "
+               "1.5. The source does not give its road, the initial state of its filter or how it weights 1 m, which "
+               "this car passes in 1/13 s. In 10 m windows the weighted acceleration is already half of that.")
     lines = tuple(Line(f"{section:g} m sections", np.arange(section / 2, _LENGTH_M_F4_34, section), one)
                   for section, one in zip(SECTIONS_M, found[0], strict=True))
     picture = Picture(Curves("Weighted r.m.s. acceleration along the road; the step lies at 50 m", "distance [m]",
@@ -258,7 +258,7 @@ def _f4_34(effort: Workload) -> Result:
         *about("Fig 4.35", [
             Statement("largest a_w of 10 m [m/s2]", "still clear that the bump causes a discomfort", tens,
                       COMFORT_WORDS[-2][0], word=Word.NOT_REPRODUCIBLE),
-            Statement("that over the largest of the other sections", "still clear", tens / quiet, 2.0,
+            Statement("that over the largest a_w of the other sections", "still clear", tens / quiet, 2.0,
                       word=Word.NOT_REPRODUCIBLE)])))
 
 
@@ -279,11 +279,11 @@ F4_34 = Study("fig_4_34", "Discomfort of a bridge's step, per metre and per 10 m
               "Simulated as in the source: a step of 38.1 mm down at 48.3 km/h on a road of IRI 2 m/km; weighting Wk.",
               _f4_34,
               items=(Item("Fig 4.34", Word.NOT_REPRODUCIBLE,
-                          "Road and filter of the figure are not printed; simulated, the discomfort per metre is of "
-                          "the printed size."),
+                          "The road and the filter of the figure are not printed; in the simulation the discomfort "
+                          "per metre has the printed size."),
                      Item("Fig 4.35", Word.NOT_REPRODUCIBLE,
-                          "Road and filter of the figure are not printed; simulated, the step is still clear over 10 "
-                          "m.")))
+                          "The road and the filter of the figure are not printed; in the simulation the step is still "
+                          "clear over 10 m.")))
 
 
 def _f4_36(effort: Workload) -> Result:
@@ -303,15 +303,16 @@ def _f4_36(effort: Workload) -> Result:
     values: tuple[Check, ...] = (Value("38.1 mm at 48.3 km/h, nearly, from Fig 4.34 [m/s2]", PRINTED_PEAK_MPS2, own,
                                        OF_ONE_SIZE,
                     Word.NOT_REPRODUCIBLE),
-              Statement("least of the figure [m/s2]", "points below the green line, comfortable", float(peaks.min()),
+              Statement("smallest of the figure [m/s2]", "points below the green line, comfortable", float(peaks.min()),
                         0.0,
                         comfort_limits[0][0], Word.NOT_REPRODUCIBLE),
               Statement("largest of the figure [m/s2]", "points above the red line, a noticeable discomfort",
                         float(peaks.max()), comfort_limits[1][0], word=Word.NOT_REPRODUCIBLE))
-    verdict = ("In proportion to the height, as the car is linear; with the speed it rises steeply up to 32 km/h and "
-               "slowly beyond, as a metre gets shorter than the blow. Where a metre begins moves its a_w by a tenth "
-               "either way. The lines for comfort are those of Table 2.5 here, a little uncomfortable from 0.315 and "
-               "uncomfortable from 0.8 m/s2, for the text does not say which ones were drawn.")
+    verdict = ("a_w is proportional to the height, as the car is linear. With speed it rises steeply up to 32 km/h "
+               "and slowly beyond, where the car passes a metre in less time than the impact lasts. The place where a "
+               "metre begins changes its a_w by 10 % either way. The text does not say which limits of comfort it "
+               "draws; those of Table 2.5 are used here: a little uncomfortable from 0.315 m/s2, uncomfortable from "
+               "0.8.")
     lines = tuple(Line(f"{1000 * height:.1f} mm", speeds, row) for height, row in zip(heights_m, peaks, strict=True))
     limits = tuple(Line(word.replace("_", " "), speeds, np.full(len(speeds), limit)) for limit, word in comfort_limits)
     picture = Picture(Curves("Largest a_w of a metre over a step", "speed [km/h]", "a_w [m/s2]", (*lines, *limits)),
@@ -327,10 +328,10 @@ def _peak(height_m: float, speed_mps: float) -> float:
     return float(per_section(record, 1.0, length_m).max())
 
 
-F4_36 = Study("fig_4_36", "Discomfort of a bridge's step by its height and the speed", "Fig 4.36, section 4.4.6",
+F4_36 = Study("fig_4_36", "Discomfort of a bridge's step by height and speed", "Fig 4.36, section 4.4.6",
               "Simulated as in the source: a step down on a road without roughness; a_w by Wk, per metre.", _f4_36,
               items=(Item("Fig 4.36", Word.NOT_REPRODUCIBLE,
-                          "Heights, speeds and limits of the figure are not printed; the one value that is, from Fig "
-                          "4.34, is of the size of ours."),))
+                          "The heights, speeds and limits of the figure are not printed; the one printed value, from "
+                          "Fig 4.34, has the size of ours."),))
 
 STUDIES = (F4_30, F4_31, F4_32, F4_34, F4_36)

@@ -98,20 +98,21 @@ def _t4_4(effort: Workload) -> Result:
         item = words.partition("(")[2].rstrip(")")
         values += about(item, [Value(f"{words}, spread between starts [%]", float(np.ptp(printed)),
                                      float(np.ptp(errors)), 1.0, Word.BETTER)])
-        values += about(item, [Statement(f"{words}, largest error on this road [%]", "each within 3 % of the exact "
-                                                                                     "value",
+        values += about(item, [Statement(f"{words}, largest error on this road [%]",
+                                         "each within 3 % of the exact value",
                                          float(np.abs(errors).max()), 0.0, 3.0)])
     many = Table(f"The same on {len(drives)} other roads of IRI 5 m/km, one fit each", (
-        Column("number"), Column("what is left is taken for"), Column("r.m.s. error [%]", ".2f"),
-        Column("standard error it gives [%]", ".2f"), Column("truth within two of them [%]", ".0f")),
+        Column("number"), Column("noise model of the residual"), Column("r.m.s. error [%]", ".2f"),
+        Column("stated standard error [%]", ".2f"), Column("truth within two standard errors [%]", ".0f")),
         tuple(chain.from_iterable(_scatter(words, name, draws) for name, words in NAMES.items())))
     verdict = (
-        "From every start ours ends at the same estimate. The printed errors differ by up to 2.4 % among themselves "
-        "for one and the same record: that is a search that stopped early. What ours keeps on this road is what a "
-        "road of IRI 5 m/km hides, and its standard error says so. The last table has other roads: the source's noise "
-        "model takes every sample for news and is too sure of itself; ours knows how a road shakes a car. The source "
-        "names neither the speed, the bump nor the road of these tables, so errors can be compared in size only; how "
-        "far the starts lie apart is the search's own. Its stiffnesses of 20,000 to 25,000 kg are in N/m.")
+        "From every start ours ends at the same estimate. The printed errors for one record differ by up to 2.4 %: "
+        "the source's search stopped early. The error that remains in ours comes from the road of IRI 5 m/km, which "
+        "the fit does not know, and its standard error says so. The last table repeats this on other roads: the "
+        "source's noise model treats the samples as independent, so its standard errors are too small; ours models "
+        "how a road shakes a car. The source does not give the speed, bump or road of these tables, so only the size "
+        "of the errors can be compared; the spread between starts depends on the search alone. The printed "
+        "stiffnesses of 20,000 to 25,000 kg should be in N/m.")
     return Result((*tables, many), verdict, (), tuple(values))
 
 
@@ -126,12 +127,13 @@ def _by_start(words: str, masses: list[tuple[int, float]], rates: list[tuple[int
         columns += [Column(f"from {rate:.0f} N/m: printed [%]", ".2f"), Column("ours [%]", "+.4f")]
     rows = tuple((mass, *chain.from_iterable((float(printed[row, column]), error) for (column, _), error in zip(
         rates, found, strict=True))) for (row, mass), found in zip(masses, errors.tolist(), strict=True))
-    return Table(f"Error of the {words}, by where the fit starts", tuple(columns), rows)
+    return Table(f"Error of the {words}, by the start of the fit", tuple(columns), rows)
 
 
 def _scatter(words: str, name: str, draws: Sequence[tuple[Fit, ...]]) -> list[tuple[Cell, ...]]:
     rows: list[tuple[Cell, ...]] = []
-    for way, found in zip(("white noise (the source's way)", "the likeliest kind (ours)"), zip(*draws, strict=True),
+    for way, found in zip(("white noise (the source's way)", "most likely noise model (ours)"), zip(*draws,
+                                                                                                    strict=True),
                           strict=True):
         errors = np.array([error_percent(one, name) for one in found])
         expected = np.array([standard_error_percent(one, name) for one in found])
@@ -144,7 +146,7 @@ T4_4 = Study("table_4_4", "Mass and both stiffnesses together, from 25 starts", 
              "Simulated as in the source: the half car of Table 4.2 over the bump of 5.5.2 at 16.1 km/h, on a road of "
              "IRI 5 m/km that the fit does not know; sensor noise 0.05 m/s2 (the source names none).", _t4_4,
              items=alike(("Table 4.4", "Table 4.5", "Table 4.6"), Word.BETTER, "From every start ours ends at one "
-                         "estimate, where the printed errors differ among themselves."))
+                         "estimate; the printed errors differ."))
 
 
 def _f4_19(effort: Workload) -> Result:
@@ -180,26 +182,26 @@ def _f4_19(effort: Workload) -> Result:
             Statement("length of the record [m]", f"a range of {window:g} m", float(record.distance_m[-1]),
                       window - 0.1,
                       window, Word.NOT_REPRODUCIBLE),
-            Statement("rear bump's top behind the front's, over wheelbase by speed", "one input for each axle",
+            Statement("delay of the rear tires' bump, over wheelbase by speed", "one input for each axle",
                       behind_s * BUMP_MPS / wheelbase_m, 0.97, 1.03, Word.NOT_REPRODUCIBLE),
-            Statement("peak over the r.m.s. that the road leaves behind the bump", "the road's roughness is noise that "
+            Statement("peak over the bump, over the r.m.s. on the road behind it", "the road's roughness is noise that "
                       "is added", float(np.abs(record.measured_mps2).max()) / road, 3.0, word=Word.NOT_REPRODUCIBLE)])
     table = Table("Response in the two windows (printed as pictures only)", (
         Column("window [m]", ".0f"), Column("lasts [s]", ".1f"), Column("peak [m/s2]", ".2f"),
         Column("r.m.s. over the bump [m/s2]", ".2f"), Column("r.m.s. behind it [m/s2]", ".2f"),
-        Column("share of the power that is the bump's [%]", ".0f")), tuple(rows))
-    verdict = (f"As the text describes it: bumps of {1000 * BUMP_HEIGHT_M:.0f} mm, the rear axle's "
-               f"{wheelbase_m / BUMP_MPS:.2f} s behind the front's, and a response that stands far above the road's "
-               f"shaking; in 100 m {rows[1][-1]:.0f} % of its power are still the bump's. The source's own bump and "
-               "road of these figures are not given, so no number can be compared.")
+        Column("share of the power from the bump [%]", ".0f")), tuple(rows))
+    verdict = (f"As the text describes: bumps of {1000 * BUMP_HEIGHT_M:.0f} mm, the rear axle's "
+               f"{wheelbase_m / BUMP_MPS:.2f} s behind the front's, and a response far above that to the road; in 100 "
+               f"m, {rows[1][-1]:.0f} % of its power still comes from the bump. The source does not give the bump and "
+               "the road of these figures, so no number can be compared.")
     return Result((table,), verdict, tuple(pictures), tuple(values))
 
 
 F4_19 = Study("fig_4_19", "A bump's input and output in windows of 15 and 100 m", "Fig 4.19, section 4.4.1.1",
               "Simulated as in the source: the bump of 5.5.2 (the text gives no size) at 16.1 km/h on a road of IRI 5 "
               "m/km that the input leaves out; sensor noise 0.05 m/s2.", _f4_19,
-              items=alike(("Fig 4.19", "Fig 4.20"), Word.NOT_REPRODUCIBLE, "Bump, speed and road of the figures are "
-                          "not printed; simulated, the response is as described."))
+              items=alike(("Fig 4.19", "Fig 4.20"), Word.NOT_REPRODUCIBLE, "The bump, speed and road of the figures "
+                          "are not printed; the simulated response is as described."))
 
 
 def _f4_21(effort: Workload) -> Result:
@@ -215,20 +217,20 @@ def _f4_21(effort: Workload) -> Result:
     numbers = np.stack([their_mass, mass, expected, 100 * (mass / TRUTH[MASS] - 1)], axis=1).tolist()
     rows = tuple((window, "very close to 875", *found) for window, found in zip(windows, numbers, strict=True))
     table = Table("Mass, by the length of the window", (
-        Column("window [m]", ".0f"), Column("printed [kg]"), Column("white noise, their way [kg]", ".1f"),
-        Column("ours [kg]", ".1f"), Column("standard error [kg]", ".1f"), Column("ours off by [%]", "+.2f")), rows)
+        Column("window [m]", ".0f"), Column("printed [kg]"), Column("white noise, the source's way [kg]", ".1f"),
+        Column("ours [kg]", ".1f"), Column("standard error [kg]", ".1f"), Column("error of ours [%]", "+.2f")), rows)
     inside = int((np.abs(mass - TRUTH[MASS]) < 2 * expected).sum())
-    verdict = ("As the source finds, the window hardly matters once both axles are over the bump (some 8 m): the "
-               f"bump tells of the mass, the road behind it next to nothing. {inside} of {len(windows)} windows have "
-               "the truth within two standard errors; all share one road, so they err together. In 5 m, where only the "
-               "front axle is over the bump, their way is a little farther off.")
+    verdict = ("As the source finds, the window hardly matters once both axles are over the bump (some 8 m): the bump "
+               f"shows the mass, the road behind it almost nothing. In {inside} of {len(windows)} windows the truth "
+               "lies within two standard errors; all share one road, so their errors are alike. In 5 m, where only "
+               "the front axle crosses the bump, the source's way is a little less accurate.")
     picture = Picture(Curves("Mass and its standard error", "window [m]", "mass [kg]", (
         Line("ours", np.array(windows), mass, expected),
-        Line("white noise, their way", np.array(windows), their_mass, dots=True)), (TRUTH[MASS], "875 kg")),
+        Line("white noise, the source's way", np.array(windows), their_mass, dots=True)), (TRUTH[MASS], "875 kg")),
         "the mass from windows of 5 to 100 m, very close to 875 kg for each")
     values = tuple(Value(f"mass, the worst window from {least:g} m, {way} [kg]", TRUTH[MASS], _worst(
         found, np.array(windows) >= least), very_close * TRUTH[MASS], Word.NOT_REPRODUCIBLE)
-                   for way, found, least in (("their way", their_mass, 10.0), ("ours", mass, 0.0)))
+                   for way, found, least in (("the source's way", their_mass, 10.0), ("ours", mass, 0.0)))
     return Result((table,), verdict, (picture,), values)
 
 
@@ -240,8 +242,8 @@ F4_21 = Study("fig_4_21", "Mass from windows of 5 to 100 m", "Fig 4.21, section 
               "Simulated as in the source: one bump (of 5.5.2; the text gives no size) at the start of the window, "
               "16.1 km/h, on a road of IRI 5 m/km that the fit does not know.", _f4_21,
               items=(Item("Fig 4.21", Word.NOT_REPRODUCIBLE,
-                          "Size of the bump and road are not printed; simulated, the window hardly matters once both "
-                          "axles are over the bump, as the text says."),))
+                          "The size of the bump and the road are not printed; in the simulation the window hardly "
+                          "matters once both axles are over the bump, as the text says."),))
 
 
 def _f4_22(effort: Workload) -> Result:
@@ -257,12 +259,13 @@ def _f4_22(effort: Workload) -> Result:
     said = f"within {printed_within_percent:g} % of 875"
     rows = tuple((float(start), said if 699 < start < 1101 else None, float(end), 100 * float(end / TRUTH[MASS] - 1))
                  for start, end in zip(starts, ends, strict=True))
-    table = Table("Mass, by where the fit starts", (Column("start [kg]", ".1f"), Column("printed end [kg]"),
+    table = Table("Mass, by the start of the fit", (Column("start [kg]", ".1f"), Column("printed end [kg]"),
                   Column("our end [kg]", ".4f"), Column("error [%]", "+.3f")), rows)
     verdict = (f"All {len(starts)} starts, from {starts[0]:.0f} to {starts[-1]:.0f} kg, end within {np.ptp(ends):.1g} "
-               f"kg of each other; the source's 20 lie within 6 % of 875 kg. The estimate itself, {ends.mean():.1f} +- "
-               f"{standard_error:.1f} kg, is off by what a road of IRI 5 m/km that the fit does not know makes of it.")
-    picture = Picture(Curves("Where a fit of the mass ends", "start [kg]", "end [kg]",
+               "kg of each other; the source's 20 lie within 6 % of 875 kg. The error of the estimate, "
+               f"{ends.mean():.1f} +- {standard_error:.1f} kg, comes from the road of IRI 5 m/km, which the fit does "
+               "not know.")
+    picture = Picture(Curves("Mass found, by the start of the fit", "start [kg]", "end [kg]",
                              (Line("start", starts, starts), Line("end", starts, ends, dots=True)),
                              (TRUTH[MASS], "875 kg")), "the masses from 20 starts, all within 6 % of 875 kg")
     values = (Statement("largest error of any start [%]", "all within 6 % of 875 kg",
@@ -276,8 +279,8 @@ F4_22 = Study("fig_4_22", "Mass from 20 starts, and from 300 to 3000 kg", "Fig 4
               "Simulated as in the source: one bump (of 5.5.2; the text gives no size) at 16.1 km/h on a road of IRI 5 "
               "m/km that the fit does not know.", _f4_22,
               items=(Item("Fig 4.22", Word.NOT_REPRODUCIBLE,
-                          "Size of the bump and road are not printed; simulated, all starts end at one mass, within "
-                          "the printed 6 %."),))
+                          "The size of the bump and the road are not printed; in the simulation all starts end at one "
+                          "mass, within the printed 6 %."),))
 
 
 def _f4_25(effort: Workload) -> Result:
@@ -293,19 +296,19 @@ def _f4_25(effort: Workload) -> Result:
                 (Column("printed, Table 5.5 [g]", ".4f"), Column("ours [g]", ".4f")),
                 ((printed_peak_g, own / STANDARD_GRAVITY_MPS2),))
     verdict = ("As the source says, a higher bump gives a larger peak and a wider one a smaller. The car is linear, "
-               "so the peak is exactly proportional to the height; no number of the figure is in the text. Over the "
+               "so the peak is exactly proportional to the height; the text gives no number of the figure. Over the "
                f"bump of 5.5.2 the model peaks at {own / STANDARD_GRAVITY_MPS2:.2f} g, the record on a row of speed "
-               "bumps at 0.87 g: the real bumps, tires or bump stops are harder than the model's, and the text "
-               "cannot tell which.")
+               "bumps at 0.87 g: the real bumps, tires or bump stops are harsher than the model's, and the text does "
+               "not show which.")
     picture = Picture(Curves("Largest acceleration over a bump", "width of the bump [m]", "peak [m/s2]", tuple(
         Line(f"{1000 * height:.0f} mm", np.array(widths), row) for height, row in zip(heights, peaks, strict=True))),
         "peaks for heights of 101.6 to 203.2 mm and widths of 1.83 to 3.35 m: the higher the larger, the wider the "
         "smaller")
-    values = (Statement("least change of the peak from one height to the next higher [m/s2]", "the larger the height, "
+    values = (Statement("smallest rise of the peak from one height to the next [m/s2]", "the larger the height, "
                         "the larger the peak", float(np.diff(peaks, axis=0).min()), least=1e-3),
-              Statement("most change of the peak from one width to the next larger [m/s2]", "the larger the width, the "
+              Statement("largest change of the peak from one width to the next [m/s2]", "the larger the width, the "
                         "smaller the peak", float(np.diff(peaks, axis=1).max()), most=-1e-3))
-    return Result((Table("Largest acceleration, either way (printed as a picture only)", columns, rows), one), verdict,
+    return Result((Table("Largest acceleration, up or down (printed as a picture only)", columns, rows), one), verdict,
                   (picture,), values)
 
 
@@ -335,44 +338,43 @@ def _f4_27(effort: Workload) -> Result:
     record = without_profile(drive)
     heights, widths = effort.some(heights_m, 3), effort.some(widths_m, 3)
     errors = np.array([[_error_percent(record, height, width) for width in widths] for height in effort.each(heights)])
-    columns = (Column("height taken [mm]", ".1f"),
-               *(Column(f"width taken {width:.2f} m [%]", "+.1f") for width in widths[::shown]))
+    columns = (Column("assumed height [mm]", ".1f"),
+               *(Column(f"assumed width {width:.2f} m [%]", "+.1f") for width in widths[::shown]))
     rows = tuple((1000 * height, *row[::shown].tolist())
                  for height, row in zip(heights[::shown], errors[::shown], strict=True))
     taken = Bump(_BUMP_AT_M_F4_27, 0.1016, 3.05)
     found = mass_and_bump(record, taken)
-    ours = Table("Ours: mass, bump and speed together, beginning with a bump taken for 101.6 mm by 3.05 m", (
+    ours = Table("Ours: mass, bump and speed together, starting from a bump of 101.6 mm by 3.05 m", (
         Column("number"), Column("truth", ".4g"), Column("estimate", ".5g"), Column("standard error", ".2g")), tuple(
         (words, truth, found.parameters[name], found.standard_errors[name]) for name, words, truth in numbers))
     best = [widths[int(np.abs(row).argmin())] for row in errors]
-    verdict = ("The slanting valley of the printed picture is there: least error for a bump taken for "
+    verdict = ("The slanting valley of the printed picture appears: the error is smallest for assumed bumps from "
                f"{1000 * heights[0]:.0f} mm by {best[0]:.2f} m up to {1000 * heights[-1]:.0f} mm by {best[-1]:.2f} m; "
-               "taken for wider, it has to be taken for higher as well. The source cuts its errors at "
-               f"{printed_limit_percent:g} %, the picture here too; its 72.2 mm is a misprint for 76.2 (3 in). The "
-               "valley is one of a fit of the mass alone. The wrong bumps in it leave far more behind than noise "
-               "does, so the record does tell height and width: fitted together with the mass they come out to a "
-               "fraction of a per cent.")
-    picture = Picture(Field("Size of the error of the mass, by what the bump is taken for", "width taken [m]",
-                            "height taken [mm]", np.array(widths), 1000 * np.array(heights), np.abs(errors),
+               f"a wider assumed bump needs a higher one. The source cuts its errors at {printed_limit_percent:g} %, "
+               "as the picture here does; its 72.2 mm is a misprint for 76.2 (3 in). The valley belongs to a fit of "
+               "the mass alone. The wrong bumps in it leave residuals far above the noise, so the record does show "
+               "height and width: a fit of all three finds them within a fraction of a per cent.")
+    picture = Picture(Field("Absolute error of the mass, by the assumed bump", "assumed width [m]",
+                            "assumed height [mm]", np.array(widths), 1000 * np.array(heights), np.abs(errors),
                             "error [%]", printed_limit_percent), "errors up to 50 % over heights of 3 to 9 in and "
-                      "widths of 6 to 11 ft, from two sides: a dark blue region of right masses that slants")
+                      "widths of 6 to 11 ft, from two viewpoints: a slanting dark blue region of correct masses")
     right_m = [float(np.interp(0.0, -row, widths)) for row in errors]  # the wider, the lighter the car
-    return Result((Table("Their way: error of the mass, fitted alone (printed as a picture only)",
+    return Result((Table("The source's way: error of the mass, fitted alone (printed as a picture only)",
                          columns, rows), ours),
                   verdict, (picture,), (
-                      *about("4.4.3 least height", [Value("3 in [mm]", 72.2, 1000 * heights_m[0], 0.5,
+                      *about("4.4.3 smallest height", [Value("3 in [mm]", 72.2, 1000 * heights_m[0], 0.5,
                                                           Word.MISPRINT, of_print=True)]),
                       *about(("Fig 4.26", "Fig 4.27"), [
-                          Statement("width of a right mass at the largest height, less that at the smallest [m]",
+                          Statement("width that gives the correct mass at the largest height, minus that at the "
+                                    "smallest [m]",
                                     "an angled region: a larger width needs a larger height", right_m[-1] - right_m[0],
                                     0.3)]),
                       *about("Fig 4.26", [Statement(
-                          "error of the mass at the grid point nearest the true bump [%]", "a region where the "
-                                                                                           "estimate "
-                          "is accurate", float(np.abs(errors).min()), 0.0, 10.0)]),
+                          "error of the mass at the grid point nearest the true bump [%]",
+                          "a region where the estimate is accurate", float(np.abs(errors).min()), 0.0, 10.0)]),
                       *about("Fig 4.27", [Statement(
                           "error of the mass with height, width and speed estimated, over its standard error",
-                          "right masses with heights and widths that are not",
+                          "correct masses with wrong heights and widths",
                           error_percent(found, MASS) / standard_error_percent(found, MASS), -3.0, 3.0, Word.BETTER)])))
 
 
@@ -381,14 +383,14 @@ def _error_percent(record: Run, height_m: float, width_m: float) -> float:
     return error_percent(fitted(record, {MASS: TRUTH[MASS]}, False, road), MASS)
 
 
-F4_27 = Study("fig_4_27", "Error of the mass by the height and width that a bump is taken for",
+F4_27 = Study("fig_4_27", "Error of the mass by the assumed height and width of a bump",
               "Fig 4.27 (and 4.26), section 4.4.3",
               "Simulated as in the source: a bump of 150 mm by 2.60 m at 16.1 km/h, no roughness; sensor noise 0.05 "
               "m/s2.", _f4_27,
-              items=(Item("Fig 4.26", Word.AGREES, "The printed valley is there for a fit of the mass alone."),
+              items=(Item("Fig 4.26", Word.AGREES, "A fit of the mass alone shows the printed valley."),
                      Item("Fig 4.27", Word.BETTER,
-                          "Height, width and mass fitted together come out to a fraction of a per cent, where a fit "
+                          "A fit of height, width and mass together finds them within a fraction of a per cent; a fit "
                           "of the mass alone has many answers."),
-                     Item("4.4.3 least height", Word.MISPRINT, "3 in are 76.2 mm, not 72.2.")))
+                     Item("4.4.3 smallest height", Word.MISPRINT, "3 in are 76.2 mm, not 72.2.")))
 
 STUDIES = (T4_4, F4_19, F4_21, F4_22, F4_25, F4_27)

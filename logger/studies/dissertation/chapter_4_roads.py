@@ -41,18 +41,18 @@ from logger.vehicle.modes import modes, undamped_frequencies_hz
 from logger.vehicle.structure import Structure
 
 COLUMNS = (Column("motion"), Column("printed [Hz]", ".1f"), Column("undamped, coupled [Hz]", ".3f"),
-           Column("springs and tires in series [Hz]", ".3f"), Column("as it rings [Hz]", ".3f"),
-           Column("printed damping", ".2f"), Column("in series, damping", ".3f"), Column("as it rings, damping", ".3f"))
+           Column("springs and tires in series [Hz]", ".3f"), Column("damped, coupled [Hz]", ".3f"),
+           Column("printed damping", ".2f"), Column("in series, damping", ".3f"), Column("coupled, damping", ".3f"))
 
 
 def _t4_1(effort: Workload) -> Result:
     printed_hz = (1.2, 11.0)
     car = quarter_car(GOLDEN_CAR)
     (rows,) = (quoted(car, ("body", "wheel"), printed_hz, (0.40, None)) for _ in effort.each(range(1)))
-    verdict = ("The printed frequencies are those of the coupled car without its damper, to their last figure. The "
-               "printed damping ratio is, nearly, that of a body on spring and tire in series with the damper beside "
-               "them: 0.395, which rounds to 0.39. As the car rings, its wheel swinging along, the body's damping is a "
-               "sixth less.")
+    verdict = ("The printed frequencies are those of the coupled car without its damper, to the last digit. The "
+               "printed damping ratio is nearly that of a body on spring and tire in series, with the damper parallel "
+               "to both: 0.395, printed 0.39. In the coupled car, whose wheel moves too, the damping ratio of the "
+               "body is a sixth smaller.")
     return Result((Table("Vibrations of the Golden Car", COLUMNS, rows),), verdict, (), quoted_values(rows))
 
 
@@ -88,7 +88,7 @@ def quoted(car: Structure, names: tuple[str, ...], printed_hz: tuple[float | Non
 T4_1 = Study("table_4_1", "Natural frequencies of the quarter car (the Golden Car)", "Table 4.1, section 4.3.3",
               "The eigenvalues of Table 4.1's car.", _t4_1,
               items=(Item("Table 4.1", Word.AGREES,
-                          "The frequencies agree to their last printed figure, the damping ratio within 0.005."),))
+                          "The frequencies agree to the last printed digit, the damping ratio within 0.005."),))
 
 
 def _t4_2(effort: Workload) -> Result:
@@ -99,11 +99,11 @@ def _t4_2(effort: Workload) -> Result:
                for _ in effort.each(range(1)))
     curb_kg, person_kg = 1524.07, 72.57
     by_eq = (curb_kg / 1.15 + 2 * person_kg) / 2
-    verdict = ("1.1 and 11 Hz are the undamped frequencies of bounce and wheels; the pitch, 1.45 Hz, is not named. The "
-               "damping ratio of 0.30 is 0.29 with springs and tires in series, 0.28 on the springs alone, rounded. "
-               f"The mass does not follow from the text: by Eq 4.36 half a car with two people has {by_eq:.0f} kg, not "
-               f"{printed_mass_kg:.0f}; 875 is taken as the published car. The inertia is in kg m2, not kg/m2; and the "
-               "pitch rows of Eq 4.23 to 4.25 have wrong signs, those of Appendix A.2 are right.")
+    verdict = ("1.1 and 11 Hz are the undamped frequencies of bounce and wheels; the pitch, 1.45 Hz, is not named. "
+               "The damping ratio of 0.30 is 0.29 with springs and tires in series, 0.28 on the springs alone, "
+               "rounded. The mass does not follow from the text: by Eq 4.36, half of the car with two people has "
+               f"{by_eq:.0f} kg, not {printed_mass_kg:.0f}; the published 875 kg is used. The inertia is in kg m2, not "
+               "kg/m2; and the pitch rows of Eq 4.23 to 4.25 have wrong signs, those of Appendix A.2 are right.")
     values = (*quoted_values(rows, damping_within=0.015),
               Value("half of the car with two people, Eq 4.36 [kg]", printed_mass_kg, by_eq, 1.0, Word.MISPRINT,
                     of_print=True))
@@ -132,17 +132,17 @@ def _t4_3(effort: Workload) -> Result:
                  for (name, gd, limit), one, spread in zip(PRINTED_T4_3, mean, std, strict=True))
     table = Table("Upper limits of the classes", (
         Column("class"), Column("printed Gd(n0) [cm3]", ".0f"), Column("printed IRI [m/km]", ".2f"),
-        Column(f"ours, mean of {roads} roads of 1 km [m/km]", ".2f"), Column("from road to road [m/km]", ".2f"),
-        Column("ours, computed [m/km]", ".3f")), rows)
+        Column(f"ours, mean of {roads} roads of 1 km [m/km]", ".2f"),
+        Column("standard deviation between roads [m/km]", ".2f"), Column("ours, computed [m/km]", ".3f")), rows)
     power = float(np.polyfit(np.log(gds), np.log(mean), 1)[0])
     factor = float((mean / np.sqrt(gds)).mean())
     relation = Table("IRI = c Gd^b", (Column("number"), Column("printed, Eq 4.39", ".4f"),
                                       Column("ours, generated", ".4f"), Column("ours, computed", ".4f")),
                      (("c", iso8608.IRI_PER_ROOT_GD, factor, iri_of_road(1.0, length_m).value), ("b", 0.5, power, 0.5)))
     verdict = (f"The relation agrees: {factor:.4f} beside the printed {iso8608.IRI_PER_ROOT_GD}, and the power is one "
-               "half because the IRI's car is linear. What is left is the choice of roads: computed for waves of 0.011 "
-               "to 2.83 cycle/m the factor is 0.543. It holds for a waviness of 2 and long roads only; 100 m scatter "
-               "by a tenth about it.")
+               "half because the IRI's car is linear. The rest is the choice of roads: computed for waves of 0.011 to "
+               "2.83 cycle/m, the factor is 0.543. The relation holds only for a waviness of 2 and long roads; roads "
+               "of 100 m scatter by 10 % about it.")
     picture = Picture(Curves("IRI of roads by degree of roughness", "root of Gd(n0) [cm^1.5]", "IRI [m/km]", (
         Line("Eq 4.39", np.sqrt(gds), iso8608.IRI_PER_ROOT_GD * np.sqrt(gds)),
         Line("ours", np.sqrt(gds), mean, dots=True))),
@@ -194,21 +194,21 @@ def _f4_3(effort: Workload) -> Result:
     table = Table(f"R.m.s. elevation of {roads} roads of 1 km", (
         Column("Gd(n0) [cm3]", ".0f"), Column("class"), Column("printed quality"),
         Column("sum of Eq 4.2's amplitudes [mm]", ".2f"), Column("ours, mean [mm]", ".2f"),
-        Column("from road to road [mm]", ".2f")), tuple(rows))
-    verdict = ("Generated roads are as high as the sum of the amplitudes of Eq 4.2 makes them, in proportion to the "
-               "root of the degree of roughness. The text says of the printed Fig 4.5 that its means are those of "
-               "earlier work and that its scatter is large; roads of 1 km with all waves of Eq 4.2 in them scatter by "
-               "2 % here. A road of 256 cm3 is of class C, which the text calls poor here; in 4.3.4 it calls class D "
-               "poor. Its ISO 8606 is ISO 8608. The argument of Eq 4.1 lacks 2 pi (Appendix A has it), its phases are "
-               "uniform, not normal, and N waves at equal steps repeat after one over the step. Ours chooses the step "
-               "for the road's length, so that nothing repeats.")
+        Column("standard deviation between roads [mm]", ".2f")), tuple(rows))
+    verdict = ("The r.m.s. elevation of generated roads is that of Eq 4.2's amplitudes, in proportion to the square "
+               "root of the degree of roughness. Of Fig 4.5 the text says that its means are those of earlier work "
+               "and that its scatter is large; here roads of 1 km with all waves of Eq 4.2 scatter by 2 %. A road of "
+               "256 cm3 is of class C, which the text calls poor here; in 4.3.4 it calls class D poor. Its ISO 8606 "
+               "is ISO 8608. The argument of Eq 4.1 lacks 2 pi (Appendix A has it), its phases are uniform, not "
+               "normal, and N waves at equal steps repeat after one over the step. Ours chooses the step for the "
+               "road's length, so that nothing repeats.")
     place = np.arange(0, 200.0, 0.5)
     shown = tuple(Line(f"{gd:.0f} cm3, {quality}", place, 1000 * iso8608.generate(gd, 200.0, 0.5, 0)[: len(place)])
                   for gd, quality in printed)
     gds = np.array(gd_cm3)
     means, stds = (np.array([row[at] for row in rows], dtype=float) for at in (4, 5))
     pictures = (Picture(Curves("Two roads (Fig 4.3, 4.4)", "distance [m]", "elevation [mm]", shown),
-                        "a picture each of a generated profile, 16 cm3 and 256 cm3"),
+                        "two figures of generated profiles, 16 cm3 and 256 cm3"),
                 Picture(Curves("R.m.s. elevation and its scatter (Fig 4.5)", "Gd(n0) [cm3]", "r.m.s. elevation [mm]", (
                     Line("ours", gds, means, stds), Line("Eq 4.2", gds, np.array([1000 * _rms_m(gd) for gd in gd_cm3]),
                                                          dots=True)), log_x=True, log_y=True),
@@ -223,11 +223,11 @@ def _rms_m(gd_n0_cm3: float) -> float:
                          * (1 / iso8608.LOWEST_CPM - 1 / iso8608.HIGHEST_CPM)))
 
 
-F4_3 = Study("fig_4_3", "Generated roads, and how high they are", "Fig 4.3, section 4.2.2",
-              "Random roads of 1 km; the printed comparison with a figure of Da Silva (2004) has no numbers, so the "
-              "sum of the amplitudes of Eq 4.2, worked out by hand, stands beside them.", _f4_3,
+F4_3 = Study("fig_4_3", "Generated roads and their r.m.s. elevation", "Fig 4.3, section 4.2.2",
+              "Random roads of 1 km; the printed comparison with a figure of Da Silva (2004) has no numbers, so ours "
+              "are compared with the sum of the amplitudes of Eq 4.2, worked out by hand.", _f4_3,
               items=(Item("Fig 4.3", Word.AGREES,
-                          "A generated road of 16 cm3 is as high as Eq 4.2 makes it, and of class A."),
+                          "A generated road of 16 cm3 has the r.m.s. elevation of Eq 4.2 and is of class A."),
                      Item("Fig 4.4", Word.MISPRINT, "A road of 256 cm3 is of class C; 4.3.4 calls class D poor."),
                      Item("Fig 4.5", Word.AGREES,
                           "The mean elevations are those of Eq 4.2, in proportion to the root of the degree of "
@@ -256,7 +256,7 @@ def _f4_16(effort: Workload) -> Result:
                   (*((f"ours, {number + 1}", one[1], one[0]) for number, one in enumerate(fits)),
                    ("ours, all", factor, power), ("printed, Eq 4.39", iso8608.IRI_PER_ROOT_GD, printed_power),
                    ("ours, computed", iri_of_road(1.0, length_m).value, 0.5)))
-    verdict = (f"Four sets of {roads} roads lie about a power law, {factor:.3f} Gd^{power:.3f} here beside 0.5386 "
+    verdict = (f"Four sets of {roads} roads scatter about a power law, {factor:.3f} Gd^{power:.3f} here beside 0.5386 "
                "Gd^0.5, which is a straight line on logarithmic axes as printed. The tolerance is three standard "
                "errors of the regression (the length of the printed roads is not given; ours have 500 m and differ by "
                f"{100 * spread:.0f} % from road to road), and 0.01 for the choice of waves: computed over 0.011 to "
@@ -281,7 +281,7 @@ F4_16 = Study("fig_4_16", "IRI of 400 random roads by their degree of roughness"
               "Four sets of 100 random roads of 2 to 4096 cm3 as in the source, each with phases of its own; exact IRI "
               "of ASTM E1926.", _f4_16,
               items=alike(("Fig 4.16", "Fig 4.17"), Word.AGREES,
-                          "The power law through the roads is Eq 4.39 within the chance of the roads."))
+                          "The power law through the roads agrees with Eq 4.39 within their random scatter."))
 
 
 def _f4_18(effort: Workload) -> Result:
@@ -303,10 +303,10 @@ def _f4_18(effort: Workload) -> Result:
                   tuple((one, *pair) for one, pair in zip(wanted.tolist(), found.T.tolist(), strict=True)))
     spread = relative_spread(length_m)
     verdict = (f"As printed, highly linear: correlation {min(alike_sets):.3f} and {max(alike_sets):.3f}, slopes "
-               f"{slopes[0]:.3f} and {slopes[1]:.3f}. A road of 500 m made for an IRI has it within "
+               f"{slopes[0]:.3f} and {slopes[1]:.3f}. A road of 500 m generated for an IRI has that IRI within "
                f"{100 * spread:.0f} % r.m.s., which is why the source shows two sets; the tolerance is three standard "
-               "errors of the slope, and 1 % for Eq 4.40. In place of ProVAL's IRI stands the exact one of ASTM "
-               "E1926, which agrees with the published check profile.")
+               "errors of the slope, and 1 % for Eq 4.40. The exact IRI of ASTM E1926, which agrees with the "
+               "published check profile, replaces ProVAL's.")
     picture = Picture(Curves("IRI of roads generated for an IRI", "IRI wanted [m/km]", "IRI [m/km]", (
         Line("as wanted", wanted, wanted), *(Line(f"set {number + 1}", wanted, one, dots=True)
                                              for number, one in enumerate(found)))),
@@ -315,8 +315,9 @@ def _f4_18(effort: Workload) -> Result:
 
 
 F4_18 = Study(
-    "fig_4_18", "Roads generated for an IRI, and the IRI that they have", "Fig 4.18, section 4.3.4",
+    "fig_4_18", "IRI of roads generated for a given IRI", "Fig 4.18, section 4.3.4",
     "Two sets of random roads of 500 m for an IRI of 1 to 20 m/km by Eq 4.40; exact IRI in place of ProVAL.", _f4_18,
-    items=(Item("Fig 4.18", Word.AGREES, "Roads made for an IRI have it, within the chance of roads of that length."),))
+    items=(Item("Fig 4.18", Word.AGREES, "Roads generated for an IRI have it, within the random scatter of roads of "
+                                         "that length."),))
 
 STUDIES = (T4_1, T4_2, T4_3, F4_3, F4_16, F4_18)

@@ -69,10 +69,10 @@ from logger.vehicle.models import structure_of
 from logger.vehicle.modes import undamped_frequencies_hz
 from logger.vehicle.named_parameters import WEAKEST
 
-HOW = ("Simulated: the five-storey building of 5.3 with 1.34 % of damping, pulled aside and let go, 75 s at 100 Hz; "
+HOW = ("Simulated: the five-storey building of 5.3 with 1.34 % of damping, pulled aside and released, 75 s at 100 Hz; "
        "a PS-2119 with steps of 0.01 g and a BMA220 with steps of 0.0625 g and 2 % less gain on its top floor. The "
-       "source measured; its records were never published. The 75 s are chosen so that the r.m.s. comes near the "
-       "printed one; gains and noise of the sensors are assumed.")
+       "source measured; its records were never published. The duration, 75 s, was chosen so that the r.m.s. is near "
+       "the printed one; gains and noise of the sensors are assumed.")
 
 
 def _t5_1(effort: Workload) -> Result:
@@ -100,16 +100,16 @@ def _t5_1(effort: Workload) -> Result:
     apart = Table("Difference of the two", (Column("printed, Eq 5.1 [%]", ".2f"), Column("ours, least [%]", ".2f"),
                                             Column("ours, most [%]", ".2f")),
                   ((printed_difference_percent, min(differences), max(differences)),))
-    verdict = (f"{first.rms_g:.4f} and {second.rms_g:.4f} g stand beside 0.0458 and 0.0445; that they are of one size "
-               "shows nothing, as the source does not say how long it recorded and the length here is chosen for it. "
-               f"That two sensors differ by some per cent agrees ({min(differences):.1f} to {max(differences):.1f} % "
-               f"over {len(compared)} draws of their noise). The unit of the print cannot be m/s2: peaks of 0.198 and "
-               "0.085 g (Eq 5.3) and 1.34 % of damping make some 0.05 g, ten times as much as 0.05 m/s2.")
+    verdict = (f"{first.rms_g:.4f} and {second.rms_g:.4f} g compare with the printed 0.0458 and 0.0445. Their similar "
+               "size proves nothing: the source does not say how long it recorded, and the duration here was chosen "
+               f"to match. That two sensors differ by a few per cent agrees ({min(differences):.1f} to "
+               f"{max(differences):.1f} % over {len(compared)} draws of their noise). The printed unit cannot be m/s2: "
+               "peaks of 0.198 and 0.085 g (Eq 5.3) and 1.34 % damping give about 0.05 g, ten times 0.05 m/s2.")
     time_s = np.arange(shown) / five_storey.RATE_HZ
     records = tuple(Line(sensor.name, time_s, readings[number][:shown])
                     for number, sensor in reversed(list(enumerate(SENSORS))))
     picture = Picture(Curves("Fig 5.8: the first 15 s", "time [s]", "acceleration [g]", records),
-                      "both records one over the other, their peaks and phases alike")
+                      "both records superimposed, with matching peaks and phases")
     return Result((apart,), verdict, (picture,), values)
 
 
@@ -124,10 +124,9 @@ T5_1 = Study("table_5_1", "R.m.s. of two sensors on the five-storey building", "
                           "The unit must be g, as the peaks of Eq 5.3 demand, not m/s2; the records were never "
                           "published."),
                      Item("Eq 5.1", Word.NOT_REPRODUCIBLE,
-                          "The records were never published; that two sensors differ by some per cent comes out of a "
-                          "simulated pair."),
+                          "The records were never published; two simulated sensors also differ by a few per cent."),
                      Item("Fig 5.8", Word.NOT_REPRODUCIBLE,
-                          "The records were never published; those of a simulated pair are alike, as described.")))
+                          "The records were never published; those of two simulated sensors match as described.")))
 
 
 PRINTED_HZ = (0.074, 2.548, 4.226)  # both sensors
@@ -150,12 +149,12 @@ def _t5_2(effort: Workload) -> Result:
         Column("standard deviation [%]", ".3f")), tuple(
         (one.sensor.name, printed, 100 * one.decrement.damping_ratio, 100 * one.decrement.damping_std)
         for one in (ps2119, phone)))
-    verdict = ("The printed 0.074 Hz is a misprint for the 0.7419 Hz of Table 5.4. Both sensors show the same first "
-               "two peaks here, as there; the third is some bins off where steps of 0.0625 g bury it. Ours lie at "
-               "the frequencies of the model that was simulated, 0.744, 2.594 and 4.523 Hz, in bins of 1/75 Hz; the "
-               "real building's second and third are 2 and 7 % lower. The decrement over all peaks gives back the "
-               f"{100 * DAMPING_RATIO:.2f} % that were put in, with an error beside it; Eq 5.3 takes two of them (its "
-               "rounded peaks give 1.35). The table above Eq 5.3 has 0.8545 m/s2 where Eq 5.3 has 0.085 g; with "
+    verdict = ("The printed 0.074 Hz is a misprint for the 0.7419 Hz of Table 5.4. As in the source, both sensors "
+               "show the same first two peaks; where steps of 0.0625 g bury the third, it is a few bins off. Ours lie "
+               "at the frequencies of the simulated model, 0.744, 2.594 and 4.523 Hz, in bins of 1/75 Hz; the real "
+               "building's second and third are 2 and 7 % lower. The logarithmic decrement over all peaks returns the "
+               f"simulated {100 * DAMPING_RATIO:.2f} %, with a standard error; Eq 5.3 uses two peaks (rounded as "
+               "printed, they give 1.35). The table above Eq 5.3 has 0.8545 m/s2 where Eq 5.3 has 0.085 g; with "
                "0.08545 g the ratio is 1.34 %.")
     (begin_s, first), (end_s, last) = printed_rows
     values = (*about("Table 5.2", [
@@ -175,7 +174,7 @@ def _t5_2(effort: Workload) -> Result:
                   100 * damping_of_two_peaks(first, last, printed_cycles), 0.005, Word.MISPRINT)]))
     spectra = Picture(Curves("Fig 5.9: spectra of both records", "frequency [Hz]", "mean power [(m/s2)2]",
                              tuple(_line(number) for number in (1, 0)), log_y=True),
-                      "the transforms of both records, with the same three peaks")
+                      "the spectra of both records, with the same three peaks")
     return Result((table, damping), verdict, (spectra,), values)
 
 
@@ -191,8 +190,8 @@ T5_2 = Study("table_5_2",
               "Modal frequencies from two sensors, and damping", "Table 5.2, section 5.3, with Eq 5.3", HOW, _t5_2,
               items=(Item("Table 5.2", Word.MISPRINT, "The printed 0.074 Hz is 0.7419 Hz, as in Table 5.4."),
                      Item("Fig 5.9", Word.NOT_REPRODUCIBLE,
-                          "The records were never published; those of a simulated pair have peaks near the printed "
-                          "three."),
+                          "The records were never published; those of two simulated sensors have peaks near the "
+                          "printed three."),
                      Item("Eq 5.3", Word.MISPRINT,
                           "The ratio agrees for peaks of 0.1978 and 0.08545 g; the table above it has 0.8545 m/s2.")))
 
@@ -216,11 +215,11 @@ def _t5_4(effort: Workload) -> Result:
         Column("ours from a simulated record [Hz]", ".4f"), Column("standard deviation [Hz]", ".4f"),
         Column("its damping [%]", ".2f")), rows)
     verdict = (f"Modes 1 and 3 of the model agree to {_off(frequencies, 0):.2f} and {_off(frequencies, 2):.2f} %, the "
-               "rounding of its dimensions, with a stiffness half way between 12EI/h^3 and 3EI/h^3 (the source has the "
-               "labels of the two swapped). The printed 2.500 Hz of mode 2 cannot be: whatever the stiffness, these "
-               "masses have it at 3.488 times the first, 2.600 Hz with the printed first; the 1.88 % beside it are the "
-               "difference of 2.548 from 2.500, so the slip stands in the model's value. From a simulated record of "
-               "five PS-2119 all modes come back, each with its standard deviation, chosen without a person.")
+               "rounding of its dimensions, with a stiffness half way between 12EI/h^3 and 3EI/h^3 (the source swaps "
+               "the labels of the two). The printed 2.500 Hz of mode 2 is impossible: whatever the stiffness, these "
+               "masses have it at 3.488 times the first, 2.600 Hz with the printed first; the 1.88 % beside it are "
+               "the difference of 2.548 from 2.500, so the slip stands in the model's value. From a simulated record "
+               "of five PS-2119, ridelog finds all modes automatically, each with its standard deviation.")
     printed_hz = five_storey.PRINTED_MODEL_HZ
     values = (
         *about("Table 5.3", [
@@ -243,7 +242,7 @@ def _t5_4(effort: Workload) -> Result:
             for ends, printed, turns in printed_stiffness]))
     floors = np.arange(6.0)
     shapes = np.vstack([np.zeros(5), _shapes(building)])
-    picture = Picture(Curves("Fig 5.10: the chain of five masses, as the shapes of its modes", "floor",
+    picture = Picture(Curves("Fig 5.10: the chain of five masses, shown by its mode shapes", "floor",
                              "motion, the largest 1", tuple(
                                  Line(f"{frequency:.3f} Hz", floors, shape)
                                  for frequency, shape in zip(frequencies.tolist(), shapes.T, strict=True))),
@@ -282,7 +281,7 @@ def _near(found: ModalResult, frequency_hz: float | None) -> tuple[Cell, ...]:
 
 
 T5_4 = Study("table_5_4", "Natural frequencies of the five-storey building", "Table 5.4, section 5.3",
-              "The eigenvalue problem of Eq 5.4, and a simulated record: pulled aside and let go, 1.34 % of damping, "
+              "The eigenvalue problem of Eq 5.4, and a simulated record: pulled aside and released, 1.34 % damping, "
               "75 s at 100 Hz, steps of 0.01 g; the source's record was never published.", _t5_4,
               items=(Item("Table 5.3", Word.AGREES, "The model's floors have the masses of the components."),
                      Item("Table 5.4", Word.MISPRINT,
@@ -325,14 +324,14 @@ def _t5_5(effort: Workload) -> Result:
         Column("printed, largest [g]", ".4f"), Column("ours [g]", ".4f"), Column("printed f1 [Hz]", ".2f"),
         Column("ours [Hz]", ".2f"), Column("printed f2 [Hz]", ".2f"), Column("ours [Hz]", ".2f")), rows)
     comb_hz = PRINTED[0][1] / 3.6 / float(structure_of(rav4()).behind_m[-1])
-    verdict = ("Of one kind only: the body swings at 1 to 2.5 Hz, and there is a second, broad hump. Segments of 2 s "
-               "have bins 0.5 Hz apart and the printed values are multiples of nearly that, so no figure tells more. "
-               "The measured peaks are two to five times the model's and f2 lies above its 11 Hz on every surface; "
-               "the sensor sat on the console, whose own vibration the source later cuts off with a low-pass (6.5), "
-               "and which Table 4.2 does not have. After slow bumps the model's wheels hardly hop, and its second "
-               f"hump is the flank of the first. Front and rear wheels cancel each other {comb_hz:.1f} Hz apart at 40 "
-               "km/h, so the model's second hump is a comb, of which the highest tooth counts. The roads' roughness "
-               "is not given and was chosen.")
+    verdict = ("Only the kind of spectrum agrees: the body bounces at 1 to 2.5 Hz, and there is a second, broad peak. "
+               "Segments of 2 s have bins 0.5 Hz apart, and the printed values are nearly multiples of that, so they "
+               "show no more. The measured peaks are two to five times the model's, and f2 lies above its 11 Hz on "
+               "every surface: the sensor sat on the console, whose own vibration the source later removes with a "
+               "low-pass (6.5), and which the car of Table 4.2 lacks. After slow bumps the model's wheels hardly hop, "
+               "and its second peak is the flank of the first. Front and rear wheels cancel at frequencies "
+               f"{comb_hz:.1f} Hz apart at 40 km/h, so the model's second peak is a comb, of which the highest tooth "
+               "is taken. The roads' roughness is not given and was chosen.")
     spectra = Picture(Curves("Table 5.5: summed spectra", "frequency [Hz]", "mean power [(m/s2)2]",
                              tuple(Line(printed[0], *_spectrum(accel))
                                    for printed, accel in zip(PRINTED, records, strict=True)), log_y=True),
@@ -341,7 +340,7 @@ def _t5_5(effort: Workload) -> Result:
     responses = tuple(
         Picture(Curves(f"{figure}: response to {printed[0]}, {printed[1]:g} km/h", "time [s]", "acceleration [g]",
                        (Line("simulated", time_s, accel[:shown] / STANDARD_GRAVITY_MPS2),)),
-                f"the measured one, up to {printed[2]:g} g; the figure before it is a photograph of the road")
+                f"the measured response, up to {printed[2]:g} g; the figure before it is a photograph of the road")
         for figure, printed, accel in zip(RESPONSES, PRINTED, records, strict=True))
     return Result((table,), verdict, (spectra, *responses), values)
 
@@ -374,14 +373,14 @@ def _bumps(place_m: np.ndarray) -> np.ndarray:
 
 
 T5_5 = Study("table_5_5", "Resonances of the car on four surfaces", "Table 5.5, section 5.5.1",
-              "The source measured. Simulated: the car of Table 4.2 for a minute on random roads of a roughness that "
-              "was chosen, four bumps of 5.5.2 on the last; a PS-2119; f1 and f2 the highest bins of the summed "
-              "spectra of even segments of 2 s within 0.5 to 5 and 7 to 18 Hz.", _t5_5,
+              "The source measured. Simulated: the car of Table 4.2 with a PS-2119, a minute on random roads whose "
+              "roughness was chosen, with four bumps of 5.5.2 on the last one. f1 and f2 are the highest bins of the "
+              "summed spectra of equal 2 s segments, within 0.5 to 5 and 7 to 18 Hz.", _t5_5,
               items=(Item("Table 5.5", Word.NOT_REPRODUCIBLE,
                           "The records were never published; a simulated car shows peaks of the same kind."),
                      *alike(RESPONSES, Word.NOT_REPRODUCIBLE,
-                            "The record was never published; that of a simulated car has its first peak at 1 to 2.5 "
-                            "Hz, too."),
+                            "The record was never published; that of a simulated car also has its first peak at 1 to "
+                            "2.5 Hz."),
                      *alike(("Fig 5.12", "Fig 5.14", "Fig 5.16", "Fig 5.18"), Word.NOT_REPRODUCIBLE,
                             "A photograph of the surface."),
                      Item("5.5.1 model", Word.AGREES, "The half car's natural frequencies are the printed ones.")))
@@ -416,7 +415,7 @@ def _f5_22(effort: Workload) -> Result:
     printed_largest_g = 0.8703  # of the row of speed bumps, Table 5.5
     cases = (
         _Case("bump, 150 mm by 2.60 m", "Fig 5.22", "strong signal",
-              "the recorded and the simulated response, one over the other, alike", bump(_AT_M), BUMP_MPS),
+              "the recorded and the simulated response superimposed, and alike", bump(_AT_M), BUMP_MPS),
         _Case("bridge, step of 38.1 mm", "Fig 5.25", "two large spikes",
               "the recorded and the simulated response with two spikes; Fig 5.26: the same, closer",
               bridge(_AT_M), BRIDGE_MPS),
@@ -427,9 +426,9 @@ def _f5_22(effort: Workload) -> Result:
     )
     drives = [(_drive(case, Conditions(0.0)), _drive(case, PS_2119.on(_IRI, seed)))
               for seed, case in enumerate(effort.each(cases), start=1)]
-    table = Table("What an obstacle does to the car, and what it tells of its mass", (
+    table = Table("Effect of an obstacle on the car, and how well it shows the mass", (
         Column("obstacle"), Column("figure"), Column("speed [km/h]", ".1f"), Column("printed"),
-        Column("peak alone [m/s2]", ".3f"), Column("r.m.s. of the road [m/s2]", ".3f"),
+        Column("peak over the obstacle alone [m/s2]", ".3f"), Column("r.m.s. of the road [m/s2]", ".3f"),
         Column("peak over road", ".2f"), Column("standard error of the mass, one pass [%]"),
         Column(f"passes for {WANTED_PERCENT:g} %")),
         tuple(_row_f5_22(case, *pair) for case, pair in zip(cases, drives, strict=True)))
@@ -440,20 +439,20 @@ def _f5_22(effort: Workload) -> Result:
                                         printed_largest_g / 2, Word.NOT_REPRODUCIBLE)]),
               *(one for case, row in zip(cases, table.rows, strict=True) for one in _stands_out(case, row)),
               *about(("Fig 5.25", "Fig 5.26"), [Statement(
-                  "second spike behind the first, over wheelbase by speed", "the front and the rear tires interact "
-                                                                            "with "
+                  "delay of the second spike, over wheelbase by speed",
+                  "the front and the rear tires interact with "
                   "the step in two large spikes", _spikes_apart_s(drives[1][0], delay_s) / delay_s, 0.9, 1.1,
                   Word.NOT_REPRODUCIBLE)]))
     lifted_mm = 1000 * TUBE_M * TUBE_M / 2 / rav4().contact_patch_m
-    verdict = (f"The model's bump peaks at {peak_g:.2f} g, the measured row of bumps at 0.87 (Table 5.5): of one "
-               "shape, as the source sees in Fig 5.22, but not of one size; the sensor sat on a console that rings "
-               "(6.5), and a bump that is shorter or driven faster hits harder (Fig 4.25). On the bridge the two "
-               f"spikes lie {delay_s:.2f} s apart, wheelbase over speed. Both tell the mass. The tube is too weak for "
+    verdict = (f"The model's bump peaks at {peak_g:.2f} g, the measured row of bumps at 0.87 (Table 5.5). The shapes "
+               "agree, as the source sees in Fig 5.22, but not the sizes: the sensor sat on a console that resonates "
+               "(6.5), and a shorter bump or a higher speed gives a larger peak (Fig 4.25). On the bridge the two "
+               f"spikes lie {delay_s:.2f} s apart, wheelbase over speed. Both show the mass. The tube is too weak for "
                "a reason that can be computed: a tire averages the road over its patch of 250 mm, and a cable of 6.35 "
-               f"mm lifts that average by {lifted_mm:.2f} mm, from which the car feels a tenth of a step of the "
-               "sensor. The source just sees it at 16 km/h, so a real tire, which bridges a cable, feels more than "
-               "this mean; yet no more than the road does by itself. Of a tube's mass ridelog refuses to say "
-               "anything, and the source left it out.")
+               f"mm lifts that average by {lifted_mm:.2f} mm, to which the sensor responds with a tenth of its step. "
+               "The source can just see it at 16 km/h, so a real tire, which bridges a cable, responds more strongly "
+               "than this average, but not more than to the road itself. From a tube, ridelog refuses to estimate a "
+               "mass, and the source does not try.")
     pictures = tuple(_picture(case, *pair) for case, pair in zip(cases, drives, strict=True))
     return Result((table,), verdict, pictures, values)
 
@@ -504,17 +503,19 @@ def _picture(case: _Case, alone: Run, sensed: Run) -> Picture:
               for name, one in lines)), case.drawn)
 
 
-F5_22 = Study("fig_5_22", "Bump, bridge and road tube: what the car feels, and why a tube is too weak",
+F5_22 = Study("fig_5_22", "Bump, bridge and road tube: the response of the car, and why a tube is too weak",
               "Fig 5.22 (and 5.25, 5.26, 5.28, 5.29), sections 5.5.2 to 5.5.4",
               "The source measured, and its records were never published. Simulated: the car of Table 4.2 with a "
-              "PS-2119 over each obstacle at its speed, alone and on a road of IRI 2 m/km (the source does not tell "
-              "its roads' roughness); the mass is fitted with the obstacle known.", _f5_22,
+              "PS-2119 over each obstacle at its speed, alone and on a road of IRI 2 m/km (the source does not give "
+              "the roughness of its roads); the mass is fitted with the obstacle known.", _f5_22,
               items=(Item("Fig 5.22", Word.NOT_REPRODUCIBLE,
-                          "The record was never published; simulated, the bump stands far out of the road, at half of "
-                          "the measured size."),
+                          "The record was never published; in the simulation the bump stands out clearly from the "
+                          "road, at half of the measured size."),
                      *alike(("Fig 5.25", "Fig 5.26"), Word.NOT_REPRODUCIBLE,
-                            "The record was never published; simulated, there are two spikes, the wheelbase apart."),
+                            "The record was never published; in the simulation there are two spikes, a wheelbase "
+                            "apart."),
                      *alike(("Fig 5.28", "Fig 5.29"), Word.NOT_REPRODUCIBLE,
-                            "The record was never published; simulated, the road hides the tube, as the text says.")))
+                            "The record was never published; in the simulation the road hides the tube, as the text "
+                            "says.")))
 
 STUDIES = (T5_1, T5_2, T5_4, T5_5, F5_22)

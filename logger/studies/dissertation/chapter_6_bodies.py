@@ -65,7 +65,7 @@ from logger.vehicle.linearise import known_vehicle
 
 PRINTED_KG = ((870.658, 844.053), (927.464, 911.141), (519.555, 660.512), (672.677, 817.204))
 PRINTED_PERCENT = ((0.50, 3.54), (6.00, 4.13), (40.62, 24.51), (23.12, 6.61))
-CASES_T6_1 = (("all as taken",
+CASES_T6_1 = (("all as assumed",
           1.0, 1.0, 1.0, 0.0), ("height 5 % more", 1.05, 1.0, 1.0, 0.0), ("height 5 % less", 0.95, 1.0, 1.0, 0.0),
          ("width 5 % more", 1.0, 1.05, 1.0, 0.0), ("width 5 % less", 1.0, 0.95, 1.0, 0.0),
          ("speed 5 % more", 1.0, 1.0, 1.05, 0.0), ("speed 5 % less", 1.0, 1.0, 0.95, 0.0),
@@ -87,42 +87,44 @@ def _t6_1(effort: Workload) -> Result:
                                 for what, form in (("mass [kg]", ".3f"), ("error [%]", ".2f")))), tuple(
         (float(number), masses[0], errors[0], masses[1], errors[1])
         for number, (masses, errors) in enumerate(zip(PRINTED_KG, PRINTED_PERCENT, strict=True), start=1)))
-    one_by_one = Table("Simulated: bump taken for 150 mm by 2.60 m at 16.1 km/h, what was true beside it", (
-        Column("truth against what was taken"), Column("their way: error of the mass [%]", "+.2f"),
+    one_by_one = Table("Simulated: assumed bump 150 mm by 2.60 m at 16.1 km/h; the true one differs by row", (
+        Column("truth relative to the assumption"), Column("the source's way: error of the mass [%]", "+.2f"),
         Column("ours, bump and speed estimated [%]", "+.2f"), Column("its standard error [%]", ".2f")), tuple(
         (case[0], *errors) for case, errors in zip(CASES_T6_1, cases, strict=True)))
     theirs, ours, expected = draws.T
     rows: tuple[tuple[Cell, ...], ...] = (
         ("printed, 8 drives", _rms_t6_1(np.array(PRINTED_PERCENT)), float(np.max(PRINTED_PERCENT)), None),
-        (f"their way, {drives} simulated drives", _rms_t6_1(theirs), float(np.abs(theirs).max()), None),
+        (f"the source's way, {drives} simulated drives", _rms_t6_1(theirs), float(np.abs(theirs).max()), None),
         ("ours, the same drives",
          _rms_t6_1(ours), float(np.abs(ours).max()),
          float(100 * (np.abs(ours) < 2 * expected).mean())))
-    many = Table(f"Height, width and speed each off by chance, 5 % r.m.s., on roads of IRI {road_iri:g} m/km", (
+    many = Table(f"Random errors of 5 % r.m.s. in height, width and speed, on roads of IRI {road_iri:g} m/km", (
         Column("way"), Column("r.m.s. error [%]", ".1f"), Column("largest [%]", ".1f"),
         Column("truth within two standard errors [%]", ".0f")), rows)
     by_trial = {f"Table 6.{trial}": _rms_t6_1(np.array(PRINTED_PERCENT)[:, trial - 1]) for trial in (1, 2)}
     per_percent = _per_percent_of_speed(cases)
-    verdict = ("A width or a speed that is 5 % off moves the source's mass by some 5 and 11 %, a height by little; "
-               f"with all three off by 5 % r.m.s. its errors are {_rms_t6_1(theirs):.0f} % r.m.s. Of the printed "
-               f"trials the second ({by_trial['Table 6.2']:.0f} %) needs no more than that; the first "
-               f"({by_trial['Table 6.1']:.0f} %) asks for twice as much, or for a speed that is "
+    verdict = ("With a width or a speed 5 % off, the source's mass is about 5 or 11 % off; the height matters little. "
+               f"With all three off by 5 % r.m.s., its errors are {_rms_t6_1(theirs):.0f} % r.m.s. Of the printed "
+               f"trials the second ({by_trial['Table 6.2']:.0f} %) is explained by that; the first "
+               f"({by_trial['Table 6.1']:.0f} %) would take twice as much, or a speed that is "
                f"{by_trial['Table 6.1'] / per_percent:.0f} % off, while a speedometer may be {100 * speedometer:.0f} % "
                "off at 16 km/h (UNECE R39). Bumps 3 and 4 are too light in both trials, so they differ from the first "
-               f"two. Estimating bump and speed together with the mass leaves {_rms_t6_1(ours):.1f} %, which is the "
-               "road's roughness, and its standard error says so.")
+               f"two. With bump and speed estimated together with the mass, the errors are {_rms_t6_1(ours):.1f} %, "
+               "which come from the road's roughness, and the standard error says so.")
     values: tuple[Check, ...] = (*(one for item, rms in by_trial.items() for one in about(item, [
-        Statement("speed that would have to be off for the printed r.m.s. error [%]", "changes in speed are a possible "
+        Statement("error of the speed that would explain the printed r.m.s. error [%]",
+                  "changes in speed are a possible "
                   "source of error", rms / per_percent, 0.0, 100 * speedometer, Word.NOT_REPRODUCIBLE)])),
         *about(tuple(by_trial), [
-            Statement("error with width or speed 5 % off, ours over their way", "discrepancies of width and speed are "
+            Statement("error with width or speed 5 % off, ours over the source's way",
+                      "discrepancies of width and speed are "
                       "possible sources of error", _largest(cases, 1) / _largest(cases, 0), 0.0, 0.2,
                       Word.NOT_REPRODUCIBLE)]),
         *(one for trial, item in enumerate(by_trial) for one in about(item, [
             Value(f"error of the printed mass, bump {bump} [%]", pair[trial],
                   100 * abs(PRINTED_KG[bump - 1][trial] / TRUTH[MASS] - 1), 0.01, of_print=True)
             for bump, pair in enumerate(PRINTED_PERCENT, start=1)])))
-    errors = {"printed": np.ravel(PRINTED_PERCENT), "their way": theirs, "ours": ours}
+    errors = {"printed": np.ravel(PRINTED_PERCENT), "the source's way": theirs, "ours": ours}
     scatter = Picture(Curves("Errors of the mass, sorted by size", "share of the drives [%]", "error of the mass [%]",
                              tuple(Line(name, 100 * (np.arange(len(found)) + 0.5) / len(found), np.sort(np.abs(found)))
                                    for name, found in errors.items())),
@@ -158,12 +160,12 @@ def _rms_t6_1(values: np.ndarray) -> float:
     return float(np.sqrt((values**2).mean()))
 
 
-T6_1 = Study("table_6_1", "Mass from speed bumps whose size and speed are not quite what was taken",
+T6_1 = Study("table_6_1", "Mass from speed bumps whose size and speed differ a little from the assumed ones",
              "Table 6.1 (and 6.2), section 6.2.1",
              "The source measured, and its records were never published. Simulated: the car of Table 4.2, a PS-2119 "
-             "with steps of 0.01 g, 20 Hz low-pass and a start at 875 kg for their way, as in 6.2.1.", _t6_1,
+             "with steps of 0.01 g, 20 Hz low-pass and a start at 875 kg for the source's way, as in 6.2.1.", _t6_1,
              items=alike(("Table 6.1", "Table 6.2"), Word.NOT_REPRODUCIBLE, "The records were never published; errors "
-                         "of that kind follow from a bump and a speed that are some per cent off."))
+                         "of that kind follow from a bump and a speed that are a few per cent off."))
 
 
 PRINTED_T6_3 = (("1-1", 700.528, 19.94, 1398.92, 59.88), ("1-2", 596.911, 31.78, 983.834, 12.44),
@@ -179,21 +181,21 @@ def _t6_3(effort: Workload) -> Result:
     jobs = [(step_m, iri, seed) for step_m, iri in cases for seed in range(roads)]
     drives = [_drive(*job) for job in effort.each(jobs)]
     rows = tuple(_row_t6_3(*case, drives[number * roads:(number + 1) * roads]) for number, case in enumerate(cases))
-    printed = Table("Printed, the input taken for a flat road", (
+    printed = Table("Printed: the road assumed flat", (
         Column("bump"), Column("trial 1, mass [kg]", ".3f"), Column("error [%]", ".2f"),
         Column("trial 2, mass [kg]", ".3f"), Column("error [%]", ".2f")), PRINTED_T6_3)
     table = Table(f"Simulated, 48.3 km/h; figures are r.m.s. over {roads} roads", (
-        Column("true step [mm]", ".1f"), Column("IRI [m/km]", ".0f"), Column("flat road taken: ours says"),
-        Column("step a third too high, their way: error of mass [%]", ".1f"),
+        Column("true step [mm]", ".1f"), Column("IRI [m/km]", ".0f"), Column("road assumed flat: our answer"),
+        Column("step assumed a third too high, the source's way: error of mass [%]", ".1f"),
         Column("ours, height estimated: error of mass [%]", ".1f"), Column("its standard error [%]", ".1f"),
         Column("mass known: error of height [mm]", ".1f"), Column("its standard error [mm]", ".1f")), rows)
-    verdict = ("The source took the road for flat. Such an input moves nothing, whatever the mass: ours refuses to "
-               "answer, and the printed masses, 12 to 60 % off, tell of the noise model and of the road, not of the "
-               "car. A step that is taken for a third too high puts the mass off by some 15 % on a smooth road (Fig "
-               "4.31). With the height estimated beside the mass, a step of 38.1 mm gives both; the error grows with "
-               "the road's roughness, and the standard error says how much. A step of half an inch on a rough road "
-               "hardly tells the mass, and that is said, too. With a known mass the height is the better thing to "
-               "ask for.")
+    verdict = ("The source assumed a flat road. A flat input moves no car, whatever its mass: ours refuses to answer, "
+               "and the printed masses, 12 to 60 % off, reflect the noise model and the road, not the car. A step "
+               "assumed a third too high makes the mass about 15 % wrong on a smooth road (Fig 4.31). With the height "
+               "estimated together with the mass, a step of 38.1 mm gives both; the error grows with the road's "
+               "roughness, and the standard error says how much. A step of half an inch on a rough road hardly shows "
+               "the mass, and its standard error says so. With a known mass, the height is the better quantity to "
+               "estimate.")
     items = ("Table 6.3", "Table 6.4")
     refused = sum(one.flat == REFUSED for one in drives) / len(drives)
     (rough_m, _), rough = cases[-1], drives[-roads:]
@@ -201,21 +203,22 @@ def _t6_3(effort: Workload) -> Result:
     least, most = (end([percent for _, _, one, _, other in PRINTED_T6_3 for percent in (one, other)])
                    for end in (min, max))
     values: tuple[Check, ...] = (*about(items, [
-        Statement("drives in which a flat input says nothing of the mass [%]", "an input taken for flat gives "
+        Statement("drives in which a flat input shows nothing of the mass [%]", "an input assumed flat gives "
                   "inconsistent masses", 100 * refused, 100.0, word=Word.NOT_REPRODUCIBLE),
-        Statement(f"their way, a step of {1000 * rough_m:.1f} mm on IRI 5 taken a third too high: r.m.s. error [%]",
+        Statement(f"the source's way, a step of {1000 * rough_m:.1f} mm on IRI 5 assumed a third too high: r.m.s. "
+                  "error [%]",
                   f"a weak signal; errors of {least:.0f} to {most:.0f} %", theirs, least, most + chance * theirs,
                   Word.NOT_REPRODUCIBLE),
-        Statement("error of the height for a known mass over its standard error, largest of all", "it can be used to "
+        Statement("largest error of the height for a known mass, over its standard error", "it can be used to "
                   "determine the step's height", max(abs(error / std) for error, std in (one.height for one in drives)),
                   0.0, 4.0, Word.NOT_REPRODUCIBLE)]),
         *(one for trial, item in enumerate(items) for one in about(item, [
             Value(f"error of the printed mass, bump {bump} [%]", found[2 * trial + 1],
                   100 * abs(found[2 * trial] / TRUTH[MASS] - 1), 0.01, of_print=True)
              for bump, *found in PRINTED_T6_3])))
-    grown = Picture(Curves("Error of the height that is found for a known mass, by the road", "IRI of the road [m/km]",
+    grown = Picture(Curves("Error of the height found with a known mass, by the road's IRI", "IRI of the road [m/km]",
                            "error of the height [mm]", tuple(_by_iri(step_m, rows) for step_m in dict(cases))),
-                    "Fig 6.2: the response to the bridge, which hardly stands out of that to the road")
+                    "Fig 6.2: the response to the bridge, which hardly stands out from that to the road")
     return Result((printed, table), verdict, (grown,), values)
 
 
@@ -271,9 +274,10 @@ def _rms_t6_3(values: Sequence[tuple[float, ...]]) -> list[float]:
 
 T6_3 = Study("table_6_3", "Mass from a bridge's steps", "Table 6.3 (and 6.4), section 6.2.2", "The source measured, "
              "and its records were never published. Simulated: the car of Table 4.2, a PS-2119 with steps of 0.01 g, "
-             "steps of 38.1 and 12.7 mm on roads of IRI 0, 2 and 5 m/km; the place of a step is estimated, too.", _t6_3,
+             "steps of 38.1 and 12.7 mm on roads of IRI 0, 2 and 5 m/km; the place of a step is also "
+             "estimated.", _t6_3,
              items=alike(("Table 6.3", "Table 6.4"), Word.NOT_REPRODUCIBLE, "The records were never published; a flat "
-                         "input tells nothing of the mass, and ours refuses it."))
+                         "input shows nothing of the mass, and ours refuses it."))
 
 
 _UNIT_M = 0.01
@@ -297,17 +301,17 @@ def _t6_5(effort: Workload) -> Result:
     sizes = ("height of a step [mm]", "depth of a dip of 0.6 m [mm]", "IRI over the window [m/km]")
     rows = tuple(_row_t6_5(printed, what, factor)
                  for printed, what, factor in zip(printed_rows, sizes, factors, strict=True))
-    table = Table("What has to lie there for the printed word", (
+    table = Table("Size that would explain the printed word", (
         Column("location", ".0f"), Column("segment", ".0f"), Column("printed perception"), Column("printed reason"),
-        Column("speed [mph]", ".0f"), Column("size that is asked for"), Column("a_w per unit of it [m/s2]", ".4f"),
-        Column("from", ".0f"), Column("to", ".0f"), Column("our word in the middle")), rows)
-    verdict = ("Not reproducible, as the records were never published and no size of what lay there is given; computed "
-               f"the other way round, the three words ask for a step of {rows[0][7]:.0f} to {rows[0][8]:.0f} mm "
-               f"between two pavements, a manhole {rows[1][7]:.0f} to {rows[1][8]:.0f} mm deep and a stretch of IRI "
-               f"{rows[2][7]:.0f} to {rows[2][8]:.0f} m/km. Such edges and manholes are to be found on any campus; "
-               "damage of that IRI is worse than the 10.75 m/km to which Table 2.3 has damaged pavements, so it was a "
-               "short piece, or the console rang along. The model is linear, so a_w goes with the size. The ranges of "
-               "Table 2.5 overlap; the more severe word is taken.")
+        Column("speed [mph]", ".0f"), Column("quantity"), Column("a_w per unit of it [m/s2]", ".4f"),
+        Column("from", ".0f"), Column("to", ".0f"), Column("our word for the middle of the range")), rows)
+    verdict = ("Not reproducible: the records were never published, and no sizes are given. Computed backwards, the "
+               f"three words require a step of {rows[0][7]:.0f} to {rows[0][8]:.0f} mm between two pavements, a "
+               f"manhole {rows[1][7]:.0f} to {rows[1][8]:.0f} mm deep and a stretch of IRI {rows[2][7]:.0f} to "
+               f"{rows[2][8]:.0f} m/km. Such edges and manholes exist on any campus; damage of that IRI exceeds the "
+               "10.75 m/km at which Table 2.3 ends damaged pavements, so the stretch was short, or the console "
+               "resonated. The model is linear, so a_w goes with the size. The ranges of Table 2.5 overlap; the more "
+               "severe word is taken.")
     depths = np.linspace(0.0, 60.0, 2)
     limits = tuple(Line(word.replace("_", " "), depths, np.full(2, limit))
                    for limit, word in COMFORT_WORDS if 0 < limit < 2.0)
@@ -346,12 +350,13 @@ def _row_t6_5(printed: tuple[int, int, str, str], what: str, factor: float) -> t
             low, high, ours.replace("_", " "))
 
 
-T6_5 = Study("table_6_5", "Three places that were revisited, and what must lie there", "Table 6.5, section 6.5.3",
+T6_5 = Study("table_6_5", "Three revisited places, and the obstacles that would explain them",
+             "Table 6.5, section 6.5.3",
               "The source measured. Simulated: the car of Table 4.2 at the speeds of Table D.1 over a step and a dip "
-              "on a flat road, 15 Hz low-pass, weighted with Wk, the worst window of 25 ft, on the average of where "
-              "in a window it lies; random roads for the damage.", _t6_5,
+              "on a flat road, 15 Hz low-pass, weighted with Wk; the worst window of 25 ft, averaged over the "
+              "position of the obstacle in its window; random roads for the damage.", _t6_5,
               items=(Item("Table 6.5", Word.NOT_REPRODUCIBLE,
-                          "Neither the records nor the sizes of what lay there were published; the printed words ask "
-                          "for a step, a manhole and damage of sizes that are to be found."),))
+                          "Neither the records nor the sizes were published; a step, a manhole and damage of "
+                          "realistic sizes would explain the printed words."),))
 
 STUDIES = (T6_1, T6_3, T6_5)

@@ -74,14 +74,14 @@ def _f6_6(effort: Workload) -> Result:
         Column("spread of 25 ft windows [%]",
                ".0f"), Column(f"two people of {rms_calibration.PASSENGER_KG:g} kg more [%]", "+.1f"),
         Column("twice the mass [%]", "+.1f")), rows)
-    verdict = ("Fig 6.3, a scheme, goes from the response to the IRI by way of the vehicle; the rest agrees with the "
+    verdict = ("Fig 6.3, a diagram, leads from the response through the vehicle to the IRI; the rest agrees with the "
                "figures: r.m.s. acceleration grows with the root of Gd(n0), whatever the length of the road, so the "
-               "trendlines are straight and parallel on logarithmic axes; with Eq 4.39 that makes one line through "
-               "the origin for each speed, the flatter the faster; more mass lowers the acceleration at every speed, "
-               "so a given reading stands for a rougher road. The printed pictures have no numbers in the text. The "
-               "line is right for long roads of waviness 2; a window of 25 ft scatters about it, and a road of "
-               "another waviness makes it drift with speed (6.3.1, Fig 6.11). The better relation that the source "
-               "asks for is that of ridelog estimate.")
+               "trendlines are straight and parallel on logarithmic axes; with Eq 4.39 that gives one line through "
+               "the origin for each speed, flatter at higher speeds; more mass lowers the acceleration at every "
+               "speed, so a given reading means a rougher road. The printed pictures have no numbers in the text. The "
+               "line holds for long roads of waviness 2; windows of 25 ft scatter about it, and on a road of another "
+               "waviness it drifts with speed (6.3.1, Fig 6.11). ridelog estimate is the better relation that the "
+               "source asks for.")
     factors = [one.accel_rms_per_root_gd.slope for one in drives]
     by_gd = Table("R.m.s. acceleration by degree of roughness: a factor times the root of Gd(n0) (Fig 6.4, 6.5)", (
         Column("speed [mph]", ".0f"), Column("printed"), Column("factor [m/s2 per cm^1.5]", ".4f"),
@@ -97,29 +97,31 @@ def _f6_6(effort: Workload) -> Result:
     loads = tuple(Picture(Curves(f"{figure}: IRI by r.m.s., {what}", *axes, _fan(slopes)), less) for figure, what,
                   slopes in (("Fig 6.7", "two people more", two), ("Fig 6.8", "twice the mass", heavy)))
     pictures = (Picture(Curves("Fig 6.4: r.m.s. acceleration by degree of roughness", *gd_axes, rms),
-                        "dots of simulated roads and a power trendline for each speed, the faster the higher"),
+                        "dots of simulated roads and a power trendline for each speed, higher at higher speeds"),
                 Picture(Curves("Fig 6.5: the same, logarithmic", *gd_axes, rms, log_x=True, log_y=True),
-                        "the same, on straight lines"),
+                        "the same, as straight lines"),
                 Picture(Curves("Fig 6.6: IRI by r.m.s. acceleration", *axes, _fan(own)),
                         "a straight line through the origin for each speed"), *loads)
     return Result((table, by_gd), verdict, pictures, (
         *about(("Fig 6.4", "Fig 6.5"), [
-            Statement("power of the r.m.s. by Gd(n0), one road at both ends of it", "a nonlinear power trendline",
-                      _power(), 0.49, 0.51),
-            Statement("least ratio of the r.m.s. from one speed to the next", "larger response at higher speeds",
+            Statement("exponent of the r.m.s. in Gd(n0), one road scaled to both ends of the range",
+                      "a nonlinear power trendline", _power(), 0.49, 0.51),
+            Statement("smallest ratio of the r.m.s. from one speed to the next", "larger response at higher speeds",
                       float(np.min(np.array(factors[1:]) / factors[:-1])), 1.0),
-            Statement("r.m.s. of roads of 1 km over that of endless ones, farthest from 1", "independent of the length",
+            Statement("r.m.s. of 1 km roads over that of infinite ones, the value farthest from 1",
+                      "independent of the length",
                       float(max(np.array(factors) * own / IRI_PER_ROOT_GD, key=lambda one: abs(one - 1))), 0.95,
                       1.05)]),
         *about("Fig 6.6", [
-            Statement("R2 of the line through drives, the least of all speeds", "a direct linear relation",
+            Statement("R2 of the line through drives, the smallest of all speeds", "a direct linear relation",
                       min(one.iri_per_accel_rms.r2 for one in drives), 0.95),
-            Statement("most ratio of the slope from one speed to the next", "the flatter the faster, as of Fig 6.4",
+            Statement("largest ratio of the slope from one speed to the next",
+                      "flatter at higher speeds, as in Fig 6.4",
                       float(np.max(own[1:] / own[:-1])), most=1.0)]),
         *(one for item, slopes in (("Fig 6.7", two), ("Fig 6.8", heavy)) for one in about(item, [
-            Statement("least change of IRI per r.m.s. [%]", "less acceleration regardless of roughness or speed",
+            Statement("smallest change of IRI per r.m.s. [%]", "less acceleration regardless of roughness or speed",
                       100 * float(np.min(slopes / own - 1)), 1.0)])),
-        *about("Fig 6.8", [Statement("least change over that of two people", "an exaggerated case",
+        *about("Fig 6.8", [Statement("smallest change over that of two people", "an exaggerated case",
                                      float(np.min((heavy / own - 1) / (two / own - 1))), 2.0)])))
 
 
@@ -137,18 +139,18 @@ def _fan(slopes: Array) -> tuple[Line, ...]:
                  for mph, slope in zip(SPEEDS_MPH, slopes.tolist(), strict=True))
 
 
-F6_6 = Study("fig_6_6", "IRI per r.m.s. acceleration at each speed, and what load does to it",
+F6_6 = Study("fig_6_6", "IRI per r.m.s. acceleration at each speed, and the effect of load",
               "Fig 6.6 (6.3 to 6.8), section 6.3",
               "Computed from the half car of Table 4.2 and the spectrum of ISO 8608, and from simulated drives over "
-              "random roads of 1 km; the source's roads have 100 m and 2 to 4096 cm3, which a linear car does not "
-              "mind.", _f6_6,
+              "random roads of 1 km; the source's roads have 100 m and 2 to 4096 cm3, which makes no difference for a "
+              "linear car.", _f6_6,
               items=(Item("Fig 6.3", Word.NOT_REPRODUCIBLE,
-                          "A scheme without a value: from the response to the IRI by way of the vehicle."),
+                          "A diagram without values: from the response through the vehicle to the IRI."),
                      *alike(("Fig 6.4", "Fig 6.5"), Word.AGREES,
-                            "The r.m.s. goes with the root of the degree of roughness, and is larger at each higher "
-                            "speed, as drawn."),
+                            "The r.m.s. grows with the square root of the degree of roughness, and with the speed, as "
+                            "drawn."),
                      Item("Fig 6.6", Word.AGREES,
-                          "One line through the origin for each speed, the flatter the faster."),
+                          "One line through the origin for each speed, flatter at higher speeds."),
                      *alike(("Fig 6.7", "Fig 6.8"), Word.AGREES, "More mass makes each line steeper.")))
 
 
@@ -179,13 +181,13 @@ def _f6_9(effort: Workload) -> Result:
         Column("r.m.s. error, ridelog estimate [m/km]", ".2f"),
         Column("exact within two standard errors [%]", ".0f")),
         tuple(_row_f6_9(window_m, one) for window_m, one in zip(windows_m, cut, strict=True)))
-    verdict = ("The printed drift is there, and has a reason. On a road of waviness 2, for which the line of "
-               f"Fig 6.6 was made, the relation keeps within {np.abs(drift[:, 1]).max():.0f} %; on one of waviness "
+    verdict = ("The printed drift appears, and has a cause. On a road of waviness 2, for which the line of Fig 6.6 "
+               f"was made, the relation stays within {np.abs(drift[:, 1]).max():.0f} %; on one of waviness "
                f"{WAVINESS[0]:g}, with more short waves, it reads {drift[0, 0]:+.0f} % at {speeds[0]} mph and "
-               f"{drift[-1, 0]:+.0f} % at {speeds[-1]}, the printed signs, and on one of {WAVINESS[-1]:g} the "
-               "reverse: a slow car feels short waves, a fast one long waves, and one number of a window cannot tell "
-               "which there were. ridelog estimate infers the road wave by wave and stays within "
-               f"{np.abs(own).max():.0f} % at every speed; in windows of 25 ft its error is "
+               f"{drift[-1, 0]:+.0f} % at {speeds[-1]}, with the printed signs, and on one of waviness "
+               f"{WAVINESS[-1]:g} the reverse: a slow car responds to short waves, a fast one to long waves, and one "
+               "number per window cannot show which the road had. ridelog estimate infers the road wave by wave and "
+               f"stays within {np.abs(own).max():.0f} % at every speed; in windows of 25 ft its error is "
                f"{rms_error(cut[1].iri_m_per_km, cut[1].exact_m_per_km):.2f} m/km beside "
                f"{rms_error(cut[1].by_rms_m_per_km, cut[1].exact_m_per_km):.2f}.")
     place_m = places_m(road)
@@ -194,7 +196,7 @@ def _f6_9(effort: Workload) -> Result:
     pictures = (
         Picture(Curves("Fig 6.9: the profile", "distance [m]", "elevation [mm]",
                        (Line("profile", place_m[shown], 1000 * road.elevation_m[shown]),)),
-                "a profile that a high-speed profiler measured, out of ProVAL"),
+                "a profile measured by a high-speed profiler, from ProVAL"),
         Picture(Curves(f"Fig 6.10: the response at {windowed_mph} mph", "distance [m]", "acceleration [m/s2]",
                        (Line("response", drive.distance_m, drive.measured_mps2),)),
                 "the simulated response of the half car to that profile"),
@@ -212,13 +214,13 @@ def _f6_9(effort: Workload) -> Result:
                       "speed", float(drift[0, 0]), 1.0),
             Statement(f"bias of the relation at {speeds[-1]} mph [%]", "underestimates at high speed",
                       float(drift[-1, 0]), most=-1.0),
-            Statement("range of the bias over the speeds, ridelog's over the relation's", "the IRI should not depend "
-                                                                                          "on "
+            Statement("range of the bias over the speeds, ridelog's over the relation's",
+                      "the IRI should not depend on "
                       "the speed", float(np.ptp(own) / np.ptp(drift[:, 0])), 0.0, 0.5, Word.BETTER)]),
         *(one for items, found in zip((("Fig 6.12", "Fig 6.13"), ("Fig 6.14", "Fig 6.15")), cut, strict=True)
           for one in about(items, [
-              Statement(f"bias of the relation at {windowed_mph} mph [%]", "shows the accuracy of the use of "
-                                                                            "acceleration",
+              Statement(f"bias of the relation at {windowed_mph} mph [%]",
+                        "shows the accuracy of the use of acceleration",
                         100 * float(found.by_rms_m_per_km.mean() / found.exact_m_per_km.mean() - 1), -15.0, 15.0),
               Statement("r.m.s. error of a window, ridelog's over the relation's", "accurate at 40 mph", rms_error(
                   found.iri_m_per_km, found.exact_m_per_km) / rms_error(found.by_rms_m_per_km, found.exact_m_per_km),
@@ -253,16 +255,17 @@ def _compared(title: str, cut: Figures) -> Curves:
 
 F6_9 = Study("fig_6_9", "IRI from acceleration beside the exact one, by speed and in windows",
               "Fig 6.9 (to 6.15), section 6.3.1",
-              "The source drives its half car, simulated, over a profile of ProVAL that it does not name. Here random "
-              "roads of 305 m and IRI 2.5 m/km stand for it, of three wavinesses; the car of Table 4.2 with a PS-2119.",
+              "The source simulates its half car over a ProVAL profile that it does not name. Random roads of 305 m, "
+              "IRI 2.5 m/km and three wavinesses replace it here; the car of Table 4.2 with a PS-2119.",
               _f6_9,
               items=(*alike(("Fig 6.9", "Fig 6.10"), Word.NOT_REPRODUCIBLE,
-                            "The profile is not named; a random road stands for it."),
+                            "The profile is not named; a random road replaces it."),
                      Item("Fig 6.11", Word.BETTER,
-                          "The drift with speed is there as printed and comes from the road's waviness; ridelog's "
-                          "estimate does not have it."),
+                          "The drift with speed appears as printed and comes from the road's waviness; ridelog's "
+                          "estimate does not drift."),
                      *alike([f"Fig 6.{number}" for number in range(12, 16)], Word.BETTER,
-                            "At 40 mph the relation is right on average; ridelog's windows err by half as much.")))
+                            "At 40 mph the relation is right on average; the errors of ridelog's windows are half as "
+                            "large.")))
 
 
 def _f6_16(effort: Workload) -> Result:
@@ -279,41 +282,44 @@ def _f6_16(effort: Workload) -> Result:
               for number, one in stepped.items()}
     table = Table("Weighted acceleration by speed (printed as pictures only)", (
         Column("speed [mph]", ".0f"), Column("a_w per IRI [m/s2 per m/km]", ".4f"),
-        Column("spread of 1 km roads [%]", ".0f"), Column("one road stepped in time", ".4f"),
+        Column("spread of 1 km roads [%]", ".0f"), Column("one road in the time domain", ".4f"),
         *(Column(f"IRI {level:g}") for level in (1, 2, 4, 8)),
-        Column("little uncomfortable from IRI [m/km]", ".1f")), tuple(
+        Column("a little uncomfortable from IRI [m/km]", ".1f")), tuple(
         (float(mph[number]), one.a_w_per_iri.slope, 100 * one.a_w_per_iri.spread, checks.get(number),
          *(comfort_word(one.a_w_per_iri.slope * level).replace("_", " ").replace(" uncomfortable", "")
            for level in (1, 2, 4, 8)),
          COMFORT_WORDS[-2][0] / one.a_w_per_iri.slope) for number, one in enumerate(lines)))
-    verdict = ("Comfort falls in proportion to roughness, and with speed, as the text says. The printed pictures have "
-               "no numbers in the text. For this car a straight line through the origin holds for each speed, because "
-               f"it is linear; from 10 to 70 mph it becomes {per_iri[-1] / per_iri[0]:.1f} times as steep, not seven "
-               "times: a road of waviness 2 shakes a car with the root of its speed, 2.6 times, and most of the rest "
-               "is the tire, whose patch of 250 mm swallows the short waves that a slow car's wheels would answer.")
+    verdict = ("Discomfort grows in proportion to roughness, and with speed, as the text says. The printed pictures "
+               "have no numbers in the text. For this car a straight line through the origin holds for each speed, "
+               f"because it is linear; from 10 to 70 mph it becomes {per_iri[-1] / per_iri[0]:.1f} times as steep, not "
+               "seven times: on a road of waviness 2 the excitation grows with the square root of the speed, 2.6 "
+               "times. Most of the rest is the tire, whose contact patch of 250 mm averages out the short waves that "
+               "would excite a slow car's wheels.")
     pictures = (
         Picture(Curves("Fig 6.16: comfort by IRI at each speed", "IRI [m/km]", "a_w [m/s2]",
                        tuple(Line(f"{one:.0f} mph", levels, row) for one, row in zip(mph, a_w, strict=True)),
                        level=(COMFORT_WORDS[-2][0], "a little uncomfortable")),
                 "a_w by IRI from 1 to 10 m/km at 10 to 70 mph"),
-        Picture(Field("Fig 6.17: the same over both", "IRI [m/km]", "speed [mph]", levels, mph, a_w, "a_w [m/s2]", 1.2),
+        Picture(Field("Fig 6.17: the same over IRI and speed", "IRI [m/km]", "speed [mph]", levels, mph, a_w,
+                      "a_w [m/s2]", 1.2),
                 "the same as a surface in three dimensions"))
     return Result((table,), verdict, pictures, about(("Fig 6.16", "Fig 6.17"), [
-        Statement("least change of a_w per IRI from one speed to the next [m/s2 per m/km]", "the faster, the less "
+        Statement("smallest rise of a_w per IRI from one speed to the next [m/s2 per m/km]", "the faster, the less "
                   "comfortable", float(np.diff(per_iri).min()), 1e-3),
-        Statement("R2 of a_w by IRI through the origin, the least of all speeds", "the rougher, the less comfortable",
-                  min(one.a_w_per_iri.r2 for one in lines), 0.95),
-        Statement("a road stepped in time over the line, farthest from 1", "a half car is simulated on generated "
-                                                                           "profiles",
+        Statement("R2 of a_w by IRI through the origin, the smallest of all speeds",
+                  "the rougher, the less comfortable", min(one.a_w_per_iri.r2 for one in lines), 0.95),
+        Statement("a road simulated in the time domain, over the line: the value farthest from 1",
+                  "a half car is simulated on generated profiles",
                   max((check / float(per_iri[number]) for number, check in checks.items()),
                       key=lambda one: abs(one - 1)), 0.85, 1.15)]))
 
 
 F6_16 = Study("fig_6_16", "Comfort by roughness and speed", "Fig 6.16 (and 6.17), section 6.4",
               "As in the source: the half car of Table 4.2 over random roads of IRI 1 to 10 m/km at 10 to 70 mph, "
-              "weighted with Wk; here 60 roads of 1 km. Beside it one road of IRI 5 m/km, driven in steps of time.",
-              _f6_16, items=alike(("Fig 6.16", "Fig 6.17"), Word.AGREES, "Comfort falls in proportion to roughness, "
-                                  "and with speed; the pictures have no numbers in the text."))
+              "weighted with Wk; here 60 roads of 1 km. In addition one road of IRI 5 m/km is simulated in the time "
+              "domain.",
+              _f6_16, items=alike(("Fig 6.16", "Fig 6.17"), Word.AGREES, "Discomfort grows in proportion to "
+                                  "roughness, and with speed; the text gives no numbers of the figures."))
 
 
 PRINTED_MPH = {**dict.fromkeys(range(1, 38), 20), **dict.fromkeys(range(1, 5), 30), **dict.fromkeys((5, 8, 9), 25),
@@ -342,7 +348,7 @@ def _f6_23(effort: Workload) -> Result:
         Column("printed speed [mph]", ".0f"), Column("segments", ".0f"), Column("exact mean IRI [m/km]", ".2f"),
         Column("printed, by r.m.s."),
         Column("by r.m.s. [%]", "+.1f"), Column("ridelog estimate [%]", "+.1f"),
-        Column("by r.m.s. on further roads [%]", "+.1f"), Column("its standard error [%]", ".1f"),
+        Column("by r.m.s. on more roads [%]", "+.1f"), Column("its standard error [%]", ".1f"),
         Column("further roads", ".0f"),
         Column("r.m.s. error by r.m.s. [m/km]", ".2f"), Column("ridelog estimate [m/km]", ".2f")), tuple(
         _row_f6_23(mph, [one for number, one in found.items() if PRINTED_MPH[number] == mph], again[mph])
@@ -359,20 +365,19 @@ def _f6_23(effort: Workload) -> Result:
     slow_mean, slow_std = float(slow.mean()), _standard_error(slow)
     few = [mph for mph, kmh in PRINTED_KMH.items() if kmh < PRINTED_SLOW_KMH]
     counts = {mph: list(PRINTED_MPH.values()).count(mph) for mph in PRINTED_KMH}
-    verdict = ("Table D.1 agrees with itself: its two columns are one speed each. The records were never published, "
-               "so the maps cannot be made again; on simulated roads the same steps give maps of the same kind. The "
+    verdict = ("Table D.1 agrees with itself: its two columns give the same speeds. The records were never published, "
+               "so the maps cannot be repeated; on simulated roads the same steps give maps of the same kind. The "
                f"text finds the IRI overestimated below {PRINTED_SLOW_KMH:g} km/h. By Table D.1 that is "
-               f"{sum(counts[mph] for mph in few)} segments, {counts[20]} at 20 mph and one alone at 15; {counts[25]} "
-               f"are driven at 25 and {counts[30]} at 30 mph. That is few to be sure of a mean: over "
-               f"{len(slow)} further roads of waviness {_WAVINESS:g} at the slow speeds the relation reads "
-               f"{slow_mean:+.1f} ± {slow_std:.1f} %, at the fast ones {fast.mean():+.1f} ± "
-               f"{_standard_error(fast):.1f} %. The cause is that of Fig 6.11, and the 15 Hz low-pass takes a part of "
-               "it away. The waviness was chosen: on roads of 2 there would be no such error (Fig 6.9). That a "
-               f"majority of windows is comfortable agrees: {shares['not_uncomfortable']:.0f} % here, for roads of a "
-               f"median IRI of {_MEDIAN_IRI:g} m/km. Better: each window's IRI has a standard error, and of drives "
-               "with GPS ridelog report draws both maps on the ground.")
+               f"{sum(counts[mph] for mph in few)} segments, {counts[20]} at 20 mph and only one at 15; {counts[25]} "
+               f"are driven at 25 and {counts[30]} at 30 mph. That is too few to be sure of a mean: over {len(slow)} "
+               f"further roads of waviness {_WAVINESS:g} at the slow speeds the relation reads {slow_mean:+.1f} ± "
+               f"{slow_std:.1f} %, at the fast ones {fast.mean():+.1f} ± {_standard_error(fast):.1f} %. The cause is "
+               "that of Fig 6.11; the 15 Hz low-pass removes a part of it. The waviness was chosen: on roads of "
+               "waviness 2 there would be no such error (Fig 6.9). That a majority of windows is comfortable agrees: "
+               f"{shares['not_uncomfortable']:.0f} % here, for roads of a median IRI of {_MEDIAN_IRI:g} m/km. Better: "
+               "each window's IRI has a standard error, and ridelog report draws both maps for drives with GPS.")
     example = found[min(segments, key=lambda number: abs(number - shown))]
-    colours = "the colours of the scale every 25 ft along an example"
+    colours = "the colours of the scale, every 25 ft along an example"
     pictures = (
         Picture(Curves(f"Fig 6.21: IRI along segment {shown}", "distance [m]", "IRI [m/km]", (
             Line("exact", example.middle_m, example.exact_m_per_km),
@@ -397,14 +402,15 @@ def _f6_23(effort: Workload) -> Result:
         *about(("Fig 6.21", "Fig 6.22"), [Value("length of a window [m]", 7.62, float(np.diff(
             example.edges_m).mean()), 1e-6, Word.NOT_REPRODUCIBLE)]),
         *about("Fig 6.23", [
-            Statement(f"bias by r.m.s. below {PRINTED_SLOW_KMH:g} km/h less two standard errors, {len(slow)} roads [%]",
+            Statement(f"bias of the r.m.s. relation below {PRINTED_SLOW_KMH:g} km/h less two standard errors, "
+                      f"{len(slow)} roads [%]",
                       "overestimated when driving slower than 32.2 km/h", slow_mean - 2 * slow_std, 0.0,
                       word=Word.NOT_REPRODUCIBLE),
-            Statement("bias by r.m.s. at 25 and 30 mph [%]", "reasonable at high speeds", float(fast.mean()), -10.0,
-                      10.0,
+            Statement("bias of the r.m.s. relation at 25 and 30 mph [%]", "reasonable at high speeds",
+                      float(fast.mean()), -10.0, 10.0,
                       Word.NOT_REPRODUCIBLE)]),
-        *about("Fig 6.24", [Statement("windows that are not uncomfortable [%]", "a majority of the roads is "
-                                                                                "comfortable",
+        *about("Fig 6.24", [Statement("windows that are not uncomfortable [%]",
+                                      "a majority of the roads is comfortable",
                                       shares["not_uncomfortable"], 50.0, word=Word.NOT_REPRODUCIBLE)]),
         *about("Table D.1", [Value(f"{mph} mph [km/h]", kmh, mph * MPH_MPS / KMH_MPS, 0.005)
                              for mph, kmh in PRINTED_KMH.items()])))
@@ -475,10 +481,10 @@ F6_23 = Study("fig_6_23", "37 road segments at their speeds: a map of roughness 
               "Simulated: 37 random roads of 183 m, median IRI 2.5 m/km, waviness 1.7, each at its speed of Table D.1; "
               "the car of Table 4.2 with a PS-2119, 15 Hz low-pass, windows of 25 ft.", _f6_23,
               items=(Item("Fig 6.19", Word.NOT_REPRODUCIBLE,
-                          "A map of the places, which were not published otherwise."),
+                          "A map of the places, which were published in no other form."),
                      Item("Fig 6.20", Word.AGREES,
-                          "Our words change at the ends of Tables 2.3 and 2.5, on which the scales rest; the colours "
-                          "are not given."),
+                          "Our words change at the limits of Tables 2.3 and 2.5, on which the scales are based; the "
+                          "colours are not given."),
                      *alike(("Fig 6.21", "Fig 6.22"), Word.NOT_REPRODUCIBLE,
                             "The record was never published; a simulated one is cut into the same windows."),
                      Item("Fig 6.23", Word.NOT_REPRODUCIBLE,
@@ -487,6 +493,6 @@ F6_23 = Study("fig_6_23", "37 road segments at their speeds: a map of roughness 
                      Item("Fig 6.24", Word.NOT_REPRODUCIBLE,
                           "Places and records were never published; on simulated roads a majority of windows is "
                           "comfortable."),
-                     Item("Table D.1", Word.AGREES, "Its two columns are one speed each.")))
+                     Item("Table D.1", Word.AGREES, "Its two columns give the same speeds.")))
 
 STUDIES = (F6_6, F6_9, F6_16, F6_23)

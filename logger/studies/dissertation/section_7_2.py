@@ -73,20 +73,19 @@ def _full_car(effort: Workload) -> Result:
     sides_m = (0.0, 0.4)
     cases = [(shared, left_m) for left_m in sides_m for shared in effort.some(shares)]
     rows = tuple(_row_full_car(*case) for case in effort.each(cases))
-    table = Table("A full car's record, explained by two models", (
-        Column("sensor left of the middle [m]", ".1f"), Column("tracks share [% of power]", ".0f"),
-        Column("printed, tracks taken for equal (6.5)"),
-        Column("r.m.s. over the half car's [%]", "+.1f"), Column("half car on the left track: error", ".3f"),
-        Column("full car on both tracks: error", ".3f")), rows)
+    table = Table("A full car's record and two models of it", (
+        Column("sensor left of the middle [m]", ".1f"), Column("power shared by the tracks [%]", ".0f"),
+        Column("printed, tracks assumed equal (6.5)"),
+        Column("r.m.s. over the half car's [%]", "+.1f"), Column("half car on the left track: NRMSE", ".3f"),
+        Column("full car on both tracks: NRMSE", ".3f")), rows)
     apart, one_track = rows[len(rows) // 2 - 1], rows[0]
-    verdict = ("Where both tracks are one, a full car with its sensor in the middle moves as the half car does: the "
-               f"half car leaves {one_track[4]:.3f} of the record, which is the sensor's noise and steps. Where the "
-               f"tracks share nothing the middle of the car feels their mean, {-float(str(apart[3])):.0f} % less than "
-               f"the half car would, and a half car on the left track leaves {apart[4]:.2f} of the record, the full "
-               f"car on both {apart[5]:.2f}. So the model counts as soon as the tracks differ, and the profile of "
-               "both tracks has to be known for it. ridelog has the full car in every command (model: full_car), "
-               "reads elevation_right_m, and the lab's effect roll makes a full car of a half one where the record "
-               "asks for it.")
+    verdict = ("Where both tracks are equal, a full car with its sensor in the middle moves like the half car: the "
+               f"NRMSE of the half car is {one_track[4]:.3f}, the sensor's noise and rounding. Where the tracks share "
+               f"nothing, the middle of the car responds to their mean, {-float(str(apart[3])):.0f} % less than the "
+               f"half car would; the NRMSE of a half car on the left track is {apart[4]:.2f}, that of the full car on "
+               f"both {apart[5]:.2f}. So the model matters as soon as the tracks differ, and it needs the profiles of "
+               "both. Every command of ridelog takes a full car (model: full_car) and reads elevation_right_m; the "
+               "lab's effect roll turns a half car into a full one where the record needs it.")
     road = _two_tracks(0.0)
     full, half = _drive(road, 0.0, PS_2119), _half(road)
     seen = slice(_SKIP, _SKIP + 300)
@@ -97,10 +96,10 @@ def _full_car(effort: Workload) -> Result:
                                  Line("full car", full.distance_m[seen], _drive(road, 0.0).measured_mps2[seen]))),
                       "nothing: future work")
     return Result((table,), verdict, (picture,), (
-        Statement("error of the full car over that of the half car, tracks that share nothing", "a full car accounts "
-                                                                                                "for "
+        Statement("NRMSE of the full car over that of the half car, tracks that share nothing",
+                  "a full car accounts for "
                   "lateral effects of the road", float(str(apart[5])) / float(str(apart[4])), 0.0, 0.2, Word.BETTER),
-        Statement("the same, where both tracks are one", "the half car is a worthwhile representation",
+        Statement("the same, both tracks equal", "the half car is a worthwhile representation",
                   float(str(one_track[5])) / float(str(one_track[4])), 0.95, 1.05)))
 
 
@@ -136,9 +135,9 @@ def _half(road: Track) -> Run:
 FULL_CAR = Study("section_7_2_full_car", "A full car, where left and right tracks differ", "Section 7.2, second item",
               "Nothing is printed: the source names it as future work. Simulated: two sides of the half car of Table "
               "4.2 as one full car (rav4-2009-full) with a PS-2119 at 14 m/s over 400 m of two random tracks of IRI 4 "
-              "m/km, which share all, some or none of their waves alike.", _full_car,
+              "m/km, which share all, some or none of their waves.", _full_car,
               items=(Item("7.2 full car", Word.BETTER,
-                          "The full car is a model of every command, and explains what two different tracks do."),))
+                          "Every command takes a full car, which explains the effect of two different tracks."),))
 
 
 def _input(effort: Workload) -> Result:
@@ -150,23 +149,24 @@ def _input(effort: Workload) -> Result:
     fits.append(("both, over one road", drives))
     probes = effort.count(10, 4)
     found = [(what, _mass(which, probes)) for what, which in effort.each(fits)]
-    mass = Table("Mass without any input: the road is unknown, its height and all", (
+    mass = Table("Mass without any known input", (
         Column("data"), Column("printed (3.4: output only)"), Column("truth [kg]", ".0f"), Column("ours [kg]", ".0f"),
         Column("error [%]", "+.1f"), Column("standard error [%]", ".1f")),
         tuple(_row_input(what, fit) for what, fit in found))
     profiles = [(one, *_profile(one, road)) for one in drives]
-    table = Table("The input from the response of a known car", (
+    table = Table("The input, from the response of a known car", (
         Column("speed [m/s]", ".0f"), Column("waves from [m]", ".2f"), Column("to [m]", ".0f"),
         Column("road in that band, r.m.s. [mm]", ".2f"), Column("error of the estimate, r.m.s. [mm]", ".2f"),
         Column("correlation", ".3f")), tuple(_of_profile(*one) for one in profiles))
     last = found[-1][1]
-    verdict = ("The source leaves it to others to find the input from the response; ridelog does both halves. With a "
-               "known car ridelog estimate gives the profile itself, in the band of waves that the car feels, "
-               f"correlated {min(float(str(row[-1])) for row in table.rows):.2f} or better with the true one. With an "
-               "unknown mass and no profile ridelog identify --unmeasured-road takes the road for a random one: one "
-               "drive tells the mass poorly and says so; two drives over one road at two speeds (--same-road) tell it "
-               f"to {100 * last.standard_errors[MASS] / TRUTH[MASS]:.0f} %, because the road is the same and what the "
-               "speed changes is the car. The source finds such results poor, having nothing to tell road from car.")
+    verdict = ("The source leaves this to future work; ridelog does both parts. With a known car, ridelog estimate "
+               "gives the profile itself, in the band of waves to which the car responds, with a correlation of "
+               f"{min(float(str(row[-1])) for row in table.rows):.2f} or better with the true one. With an unknown "
+               "mass and no profile, ridelog identify --unmeasured-road models the road as random: one drive gives "
+               "the mass poorly, and its standard error says so; two drives over one road at two speeds (--same-road) "
+               f"give it within {100 * last.standard_errors[MASS] / TRUTH[MASS]:.0f} %, because the road is the same "
+               "at both speeds, and the response of the car is not. The source finds such results poor, as it cannot "
+               "separate road and car.")
     drive, start_m, spacing_m, true, ours, _ = profiles[-1]
     place_m = np.asarray(start_m + spacing_m * np.arange(len(true)), float)
     picture = Picture(Curves(f"The road from the response at {drive.speed_mps[0]:g} m/s", "distance [m]",
@@ -175,12 +175,11 @@ def _input(effort: Workload) -> Result:
                       "nothing: future work")
     error, std = last.parameters[MASS] - TRUTH[MASS], last.standard_errors[MASS]
     return Result((table, mass), verdict, (picture,), (
-        Statement("correlation of the profile found with the true one, the lesser drive", "further research: the input "
-                  "from what is found in the response", min(float(str(row[-1])) for row in table.rows), 0.9,
+        Statement("correlation of the found profile with the true one, the worse drive", "further research: the input "
+                  "from the response", min(float(str(row[-1])) for row in table.rows), 0.9,
                   word=Word.BETTER),
-        Statement("error of the mass from two drives without any input, over its standard error", "an unknown input "
-                                                                                                  "gives "
-                  "poor results", error / std, -3.0, 3.0, Word.BETTER),
+        Statement("error of the mass from two drives without any input, over its standard error",
+                  "an unknown input gives poor results", error / std, -3.0, 3.0, Word.BETTER),
         Statement("that standard error [%]", "an unknown input gives poor results", 100 * std / TRUTH[MASS], 0.0, 10.0,
                   Word.BETTER)))
 
@@ -219,8 +218,8 @@ INPUT = Study("section_7_2_input", "The input found from the response", "Section
               "Nothing is printed: the source names it as future work. Simulated: the car of Table 4.2 with a PS-2119 "
               "over 300 m of random road of IRI 4 m/km at 10 and 20 m/s.", _input,
               items=(Item("7.2 input from response", Word.BETTER,
-                          "The profile comes out of the response of a known car, and the mass out of two drives over "
-                          "one road that nobody measured."),))
+                          "ridelog finds the profile from the response of a known car, and the mass from two drives "
+                          "over one road that nobody measured."),))
 
 
 PRINTED = {("bump, 150 mm", 10): "used", ("bridge, step of 38.1 mm", 30): "used", ("tube, 6.35 mm", 10): "too weak"}
@@ -254,18 +253,19 @@ def _other_vehicles(effort: Workload) -> Result:
     vehicles = Table("The vehicles of config/vehicles (printed: one car)", (
         Column("vehicle"), Column("model"), Column("body from [Hz]", ".2f"), Column("wheels to [Hz]", ".1f"),
         Column(f"IRI per r.m.s. at {RELATION_MPH} mph [m/km per m/s2]", ".2f"),
-        Column("peak on the bump of 5.5.2 [g]", ".2f"), Column("standard error of its mass, one pass [%]")),
+        Column("peak over the bump of 5.5.2 [g]", ".2f"), Column("standard error of its mass, one pass [%]")),
         tuple(rows[:len(cars)]))
     sizes = Table(f"Inputs of other sizes and speeds, the car of Table 4.2, road of IRI {_IRI_OTHER_VEHICLES:g} m/km", (
         Column("input"), Column("speed [mph]", ".0f"), Column("printed"), Column("peak [m/s2]", ".2f"),
         Column("standard error of the mass, one pass [%]")), tuple(rows[len(cars):]))
     relation = [float(str(row[4])) for row in vehicles.rows]
-    verdict = (f"One reading stands for roads that differ by a factor of {max(relation) / min(relation):.1f} from car "
-               "to car, so the car has to be known; ridelog takes any as a short file, of one, two or four wheels, "
-               "and seven come with it. The bump of 5.5.2 tells the mass of each. A larger input tells more, in "
-               "proportion; a bridge's step of 38 mm tells it to some 3 %, one of 13 mm to 8 to 9, as well at 60 mph "
-               "as at 30. A tube tells nothing at any of these speeds, not even one of 19 mm: the road grows with "
-               "speed and the tube does not. ridelog plan says of any car what a drive would show.")
+    verdict = (f"One reading means roads that differ by a factor of {max(relation) / min(relation):.1f} between cars, "
+               "so the car has to be known; ridelog takes any car as a short file, with one, two or four wheels, and "
+               "seven come with it. The bump of 5.5.2 shows the mass of each. A larger input shows it better, in "
+               "proportion: a bridge's step of 38 mm gives it within about 3 %, one of 13 mm within 8 to 9 %, at 60 "
+               "mph as well as at 30. A tube shows nothing at any of these speeds, not even one of 19 mm: the "
+               "response to the road grows with speed, that to the tube does not. ridelog plan predicts for any car "
+               "what a drive would show.")
     mph = np.arange(10.0, 71.0, 5.0)
     lines = tuple(Line(car.name, mph, rms_relation(known_vehicle(car), None, mph * MPH_MPS).iri_per_accel_rms)
                   for car in cars)
@@ -274,13 +274,13 @@ def _other_vehicles(effort: Workload) -> Result:
     tubes, others = ([str(row[4]) for row in sizes.rows if str(row[0]).startswith("tube") is is_tube]
                      for is_tube in (True, False))
     return Result((vehicles, sizes), verdict, (picture,), (
-        Statement("vehicles whose bump tells their mass to 5 % in one pass", "vehicles of different sizes, as future "
-                                                                             "work",
+        Statement("vehicles whose mass the bump shows within 5 % in one pass",
+                  "vehicles of different sizes, as future work",
                   float(sum(_percent(str(row[6])) < 5 for row in vehicles.rows)), float(len(cars)), word=Word.BETTER),
-        Statement("standard error of the mass, the worst of bumps and bridges [%]", "user-created inputs of other "
-                                                                                    "sizes, "
+        Statement("standard error of the mass, the worst of bumps and bridges [%]",
+                  "user-created inputs of other sizes, "
                   "bridges at higher speeds, as future work", max(map(_percent, others)), 0.0, 10.0, Word.BETTER),
-        Statement("tubes that tell the mass", "tubes at higher speeds, as future work",
+        Statement("tubes that show the mass", "tubes at higher speeds, as future work",
                   float(sum(_percent(one) < 100 * WEAKEST for one in tubes)), 0.0, 0.0, Word.BETTER)))
 
 
@@ -321,8 +321,8 @@ OTHER_VEHICLES = Study("section_7_2_other_vehicles", "Other vehicles, other inpu
               "ridelog over the bump of 5.5.2, and the car of Table 4.2 over other inputs, with a PS-2119 on a road of "
               "IRI 2 m/km; the obstacle is known, the road is not.", _other_vehicles,
               items=(Item("7.2 other vehicles", Word.BETTER,
-                          "Seven vehicles come with ridelog, and what each input tells of a mass is computed before "
-                          "any drive."),))
+                          "Seven vehicles come with ridelog; it predicts before any drive how well each input shows a "
+                          "mass."),))
 
 
 def _sensor_position(effort: Workload) -> Result:
@@ -332,7 +332,8 @@ def _sensor_position(effort: Workload) -> Result:
     speeds = np.array(speeds_mph) * MPH_MPS
     felt = np.array([1 / rms_relation(known_vehicle(_at(place)), None, speeds).iri_per_accel_rms for place in at_m])
     change = 100 * (felt / felt[at_m.index(0.0)] - 1)
-    table = Table("R.m.s. acceleration by where the sensor sits, over that at the centre of gravity (printed: nothing)",
+    table = Table("R.m.s. acceleration by the place of the sensor, over that at the centre of gravity (nothing "
+                  "printed)",
                   (Column("speed [mph]", ".0f"), *(Column(f"{place:+g} m ahead [%]", "+.1f") for place in at_m)),
                   tuple((float(mph), *map(float, row)) for mph, row in zip(speeds_mph, change.T, strict=True)))
     road = random_road(3.0, 230.0, 5)
@@ -343,28 +344,29 @@ def _sensor_position(effort: Workload) -> Result:
         exact = aware.exact_m_per_km.mean()
         rows.append((place, *(100 * float(one.mean() / exact - 1)
                               for one in (unaware.by_rms_m_per_km, unaware.iri_m_per_km, aware.iri_m_per_km))))
-    biases = Table(f"What that does to the IRI of a road, at {estimated_mph} mph", (
+    biases = Table(f"Effect on the IRI of a road, at {estimated_mph} mph", (
         Column("sensor ahead by [m]", "+.1f"), Column("r.m.s. relation, place not known [%]", "+.1f"),
         Column("ridelog estimate, place not known [%]", "+.1f"),
         Column("ridelog estimate, place in the vehicle's file [%]", "+.1f")), tuple(rows))
     worst = max(abs(float(row[2])) for row in rows)
     verdict = (f"A metre ahead of the centre of gravity the sensor reads {change[-1].min():.0f} to "
-               f"{change[-1].max():.0f} % more than there, by speed, because pitch is added; behind it similarly. An "
-               "estimate that does not know the place explains pitch by waves which the middle of the car hardly "
-               f"feels, and is off by up to {worst:.0f} %; one that has the place in the vehicle's file (sensor: "
-               f"ahead_m) by {max(abs(float(row[3])) for row in rows):.0f} %. Where the place is not known, ridelog "
-               "diagnose finds sensor_offset among the missing effects, and ridelog identify estimates sensor.ahead_m.")
-    picture = Picture(Curves("What a sensor reads by its place", "speed [mph]", "change of the r.m.s. acceleration [%]",
+               f"{change[-1].max():.0f} % more than at the centre, depending on speed, because pitch is added; behind "
+               "it similarly. An estimate that does not know the place explains pitch by waves that hardly move the "
+               f"middle of the car, and is off by up to {worst:.0f} %; one that has the place in the vehicle's file "
+               f"(sensor: ahead_m) by {max(abs(float(row[3])) for row in rows):.0f} %. Where the place is not known, "
+               "ridelog diagnose finds sensor_offset among the missing effects, and ridelog identify estimates "
+               "sensor.ahead_m.")
+    picture = Picture(Curves("Reading of a sensor by its place", "speed [mph]", "change of the r.m.s. acceleration [%]",
                              tuple(Line(f"{place:+g} m ahead", np.array(speeds_mph, dtype=float), row)
                                    for place, row in zip(at_m, change, strict=True) if place),
                              level=(0.0, "at the centre")), "nothing: future work")
     return Result((table, biases), verdict, (picture,), (
-        Statement("least change of the r.m.s. a metre ahead or behind [%]", "a further look can demonstrate the effect "
-                                                                            "of "
-                  "pitch", float(change[[0, -1]].min()), 10.0, word=Word.BETTER),
-        Statement("largest bias of the IRI with the place in the vehicle's file [%]", "the sensor is assumed at the "
-                                                                                      "centre "
-                  "of gravity", max(abs(float(row[3])) for row in rows), 0.0, 5.0, Word.BETTER)))
+        Statement("smallest change of the r.m.s. a metre ahead or behind [%]",
+                  "a further look can demonstrate the effect of pitch", float(change[[0, -1]].min()), 10.0,
+                  word=Word.BETTER),
+        Statement("largest bias of the IRI with the place in the vehicle's file [%]",
+                  "the sensor is assumed at the centre of gravity",
+                  max(abs(float(row[3])) for row in rows), 0.0, 5.0, Word.BETTER)))
 
 
 def _at(ahead_m: float) -> Vehicle:
@@ -376,7 +378,7 @@ SENSOR_POSITION = Study("section_7_2_sensor_position", "A sensor away from the c
               "Nothing is printed: the source names it as future work. Computed for the half car of Table 4.2 on roads "
               "of ISO 8608, and simulated over 230 m of random road of IRI 3 m/km with a PS-2119.", _sensor_position,
               items=(Item("7.2 sensor position", Word.BETTER,
-                          "The place of the sensor is part of the vehicle, and with it the pitch that it feels."),))
+                          "The place of the sensor is part of the vehicle, so its pitch is part of the model."),))
 
 
 def _speed(effort: Workload) -> Result:
@@ -393,34 +395,33 @@ def _speed(effort: Workload) -> Result:
         errors = (rms_error(by_rms, exact), rms_error(ours, exact), limit)
         rows.append((float(one_mph), *(100 * one for one in drift), *errors,
                      100 * float((np.abs(ours - exact) < 2 * std).mean())))
-    table = Table("Windows of 25 ft on roads of three wavinesses, one IRI (printed: nothing)", (
-        Column("speed [mph]", ".0f"), Column("r.m.s. relation: how far the roads are apart [%]", ".0f"),
-        Column("ridelog estimate: the same [%]", ".0f"), Column("r.m.s. error of a window, relation [m/km]", ".2f"),
-        Column("ridelog estimate [m/km]", ".2f"), Column("least possible [m/km]", ".2f"),
+    table = Table("Windows of 25 ft on roads of three wavinesses and one IRI (nothing printed)", (
+        Column("speed [mph]", ".0f"), Column("r.m.s. relation: spread between the roads [%]", ".0f"),
+        Column("ridelog estimate: spread [%]", ".0f"), Column("r.m.s. error of a window, relation [m/km]", ".2f"),
+        Column("ridelog estimate [m/km]", ".2f"), Column("smallest possible [m/km]", ".2f"),
         Column("exact within two standard errors [%]", ".0f")), tuple(rows))
     relation, spread = (max(float(row[place]) for row in rows) for place in (1, 2))
     mph, by_relation, own, least = (np.array([row[place] for row in rows]) for place in (0, 3, 4, 5))
-    verdict = ("The source asks for a relation that does not drift with the speed. Three roads of one IRI, but of "
-               f"waves mixed otherwise, are up to {relation:.0f} % apart by the r.m.s. relation and {spread:.0f} % by "
+    verdict = ("The source asks for a relation that does not drift with the speed. Three roads of one IRI but "
+               f"different waviness are up to {relation:.0f} % apart by the r.m.s. relation and {spread:.0f} % by "
                f"ridelog estimate, whose windows are off by {own.min():.2f} to {own.max():.2f} m/km at 10 to 70 mph "
-               f"beside {by_relation.min():.2f} to {by_relation.max():.2f}. The least possible error, for one who knew "
-               "spectrum, noise and car exactly, stands beside it; what is missing to it is what had to be learnt from "
-               "the drive. The car's parameters were known here: of a car that is not, ridelog identify comes first.")
+               f"beside {by_relation.min():.2f} to {by_relation.max():.2f}. The table also has the smallest possible "
+               "error, for exactly known spectrum, noise and car; the difference is the cost of learning them from "
+               "the drive. The car's parameters were known here; for an unknown car, run ridelog identify first.")
     picture = Picture(Curves("R.m.s. error of a window of 25 ft by speed", "speed [mph]", "error [m/km]",
-                             (Line("ridelog estimate", mph, own), Line("least possible", mph, least),
+                             (Line("ridelog estimate", mph, own), Line("smallest possible", mph, least),
                               Line("r.m.s. relation", mph, by_relation))), "nothing: future work")
     return Result((table,), verdict, (picture,), (
-        Statement("how far the roads are apart at the worst speed, ridelog's over the relation's", "an improved "
+        Statement("spread between the roads at the worst speed, ridelog's over the relation's", "an improved "
                   "correlation is needed: the IRI should remain constant", spread / relation, 0.0, 0.25, Word.BETTER),
-        Statement("r.m.s. error of a window over the least possible, the worst speed", "with a single accelerometer",
-                  float((own / least).max()), 0.0, 1.35, Word.BETTER)))
+        Statement("r.m.s. error of a window over the smallest possible, at the worst speed",
+                  "with a single accelerometer", float((own / least).max()), 0.0, 1.35, Word.BETTER)))
 
 
 SPEED = Study("section_7_2_speed", "An IRI that does not drift with the speed", "Section 7.2, fifth item",
               "Nothing is printed: the source names it as future work. Simulated: the car of Table 4.2 with a PS-2119 "
               "at 10 to 70 mph over 230 m each of random roads of IRI 3 m/km and waviness 1.6, 2 and 2.4.", _speed,
               items=(Item("7.2 speed", Word.BETTER,
-                          "The estimate infers the road wave by wave, so that the speed at which it was felt drops "
-                          "out."),))
+                          "The estimate infers the road wave by wave, so the speed of the drive cancels."),))
 
 STUDIES = (FULL_CAR, INPUT, OTHER_VEHICLES, SENSOR_POSITION, SPEED)

@@ -56,15 +56,15 @@ def _five_modes(effort: Workload) -> Result:
     values += _beside("damping ratio of mode {} found", printed_damping, (printed_true_damping,) * 5, damping,
                       damping_std)
     values += [Statement(f"modes missed in {count} records", "found where they are named by hand", float(missed), 0, 0,
-                         Word.BETTER), Statement("modes that are not there", "found where they are named by hand",
+                         Word.BETTER), Statement("false modes", "found where they are named by hand",
                                                  float(extra), 0, 0, Word.BETTER)]
     worst = 100 * float(max(abs(one / printed_true_damping - 1) for one in printed_damping))
     ours = 100 * float(np.median(np.abs(numbers[:, :, 1] / printed_true_damping - 1).max(axis=1)))
-    verdict = (f"In {count} records {missed} of {5 * count} modes are missed and {extra} found that are not there, "
-               "without a person who names them; the example is given their frequencies. The worst damping is "
-               f"{ours:.0f} % off on the median, {worst:.0f} % in the print, and here each has a standard error: 300 s "
-               "of random shaking show a damping no better. Versions of the example differ in the record's length; "
-               "the current one's is taken, 300 s.")
+    verdict = (f"In {count} records {missed} of {5 * count} modes are missed and {extra} false ones found, "
+               f"automatically; the example is given the frequencies. The worst damping ratio is {ours:.0f} % off "
+               f"(median), {worst:.0f} % in the print, and here each has a standard error: 300 s of random shaking "
+               "determine a damping ratio no better. Versions of the example differ in the record's length; that of "
+               "the current one is used, 300 s.")
     table = Table("The first record", (
         Column("mode", ".0f"), Column("true [Hz]", ".3f"), Column("printed [Hz]", ".3f"), Column("ours [Hz]", ".3f"),
         Column("its standard error [Hz]", ".3f"), Column("printed damping", ".3f"), Column("ours", ".4f"),
@@ -96,9 +96,9 @@ def _beside(name: str, printed: tuple[float, ...], true: tuple[float, ...], ours
 FIVE_MODES = Study(
     "five_modes", "Five modes at 20 dB", "Example 1: getting started",
     "The example's building: five floors of 25.91 kg, storeys of 10,000 N/m, 2 % of damping, a white force on each "
-    "floor, a tenth of noise (20 dB); 300 s at 20 Hz, to which the example decimates.", _five_modes,
+    "floor, 10 % noise (20 dB); 300 s at 20 Hz, the rate to which the example decimates.", _five_modes,
     items=(Item("five modes at 20 dB", Word.BETTER,
-                "All five come out without being named, each with a standard error."),),
+                "ridelog finds all five automatically, each with a standard error."),),
     source="D. P. Pasca et al., pyOMA2, Examples/Example1.ipynb, printed January 2025")
 
 
@@ -118,19 +118,19 @@ def _mass_from_a_bump(effort: Workload) -> Result:
     rms = float(np.sqrt(np.mean(errors**2)))
     # A scatter of n draws is itself off by its share 1 / sqrt(2 n).
     near = 3.0 * scatter / np.sqrt(2 * len(errors))
-    values = (Statement("error of the mass, r.m.s. [%]", "0.07 % off, in runs of our own of SciPy and lmfit", rms, 0.0,
+    values = (Statement("error of the mass, r.m.s. [%]", "0.07 % off, in our own runs of SciPy and lmfit", rms, 0.0,
                         scatter + float(near), Word.NOT_REPRODUCIBLE),
-              Statement("standard error that is given over that of the record", "the same",
+              Statement("stated standard error over that of the record", "the same",
                         float(given.mean()) / scatter,
                         1 - float(near) / scatter, 1 + float(near) / scatter, Word.NOT_REPRODUCIBLE))
     inside = float(np.mean(np.abs(errors) < 2 * given))
     table = Table("The mass from one bump (nothing of it is printed)", (
         Column("package, run by us"), Column("error [%]", "+.2f"), Column("its standard error [%]", ".2f")),
         (*peers, (f"ridelog, r.m.s. of {len(errors)} records", rms, float(given.mean()))))
-    verdict = (f"The mass comes out {rms:.2f} % off (r.m.s. over {len(errors)} records), as near as the record's "
-               "noise lets anybody come, and its standard error says so: the truth lies within two of them in "
-               f"{inside:.0%}. Packages that are given the car's equations do as well; those without find frequencies "
-               "and no mass. The paper finds all of a car's numbers by a genetic algorithm.")
+    verdict = (f"The mass is {rms:.2f} % off (r.m.s. over {len(errors)} records), as close as the record's noise "
+               f"allows, and the standard error says so: the truth lies within two standard errors in {inside:.0%}. "
+               "Packages that are given the car's equations do equally well; the others find frequencies but no mass. "
+               "The paper finds all parameters of a car by a genetic algorithm.")
     picture = Picture(Curves("Error of the mass, record by record", "record", "error [%]", (
         Line("ours", np.arange(1.0, len(errors) + 1), errors, given, dots=True),)))
     return Result((table,), verdict, (picture,), values)
@@ -139,10 +139,10 @@ def _mass_from_a_bump(effort: Workload) -> Result:
 MASS_FROM_A_BUMP = Study(
     "mass_from_a_bump", "The mass from one bump", "Errors of the mass",
     "The half car of Table 4.2 of the dissertation over its bump of 0.15 m by 2.6 m at 16.1 km/h: 6 s at 100 Hz with "
-    "white noise of 0.05 m/s2; the mass alone is sought, from 800 kg.", _mass_from_a_bump,
+    "white noise of 0.05 m/s2; only the mass is fitted, from 800 kg.", _mass_from_a_bump,
     items=(Item("hidden mass from a bump", Word.NOT_REPRODUCIBLE,
-                "The paper's record was not published; on a simulated one error and standard error are those that the "
-                "noise leaves."),),
+                "The paper's record was not published; on simulated ones, error and standard error are those that the "
+                "noise allows."),),
     source="B. Zhao, T. Nagayama, K. Xue, Journal of Sound and Vibration 457, 2019; packages run by ridelog's "
            "developers")
 
@@ -181,10 +181,10 @@ def _lab_examination(effort: Workload) -> Result:
     table = Table(f"Counts of the examination (printed in docs/examination.md), {seeds}", (
         Column("asked"), Column("goal"), Column("true of"), Column("share [%]", ".1f"), Column("at least [%]", ".1f"),
         Column("at most [%]", ".1f")), tuple(rows))
-    verdict = (f"{counts['cases']} of {counts['asked']} cases were put before the lab, {seeds}, made by a simulator "
-               f"that shares nothing with it. By their shares {met} of {len(rows)} goals are met; by the far end of "
-               f"the 95 % interval, {surely} are. It is our own examination: nobody else has printed one, and as it "
-               "takes hours it was not repeated here, so nothing is compared with a print.")
+    verdict = (f"{counts['cases']} of {counts['asked']} cases were given to the lab, {seeds}, made by a simulator that "
+               f"shares no code with it. By the measured shares, {met} of {len(rows)} goals are met; by the far end of "
+               f"the 95 % interval, {surely} are. This examination is our own: nobody else has published one. As it "
+               "takes hours, it was not repeated here, and nothing is compared with a print.")
     at = np.arange(1.0, len(rows) + 1)
     shares, lows, highs = (np.array([row[place] for row in rows], dtype=np.float64) for place in (3, 4, 5))
     picture = Picture(Curves("Shares with their 95 % intervals", "row of the table", "cases [%]", (
@@ -195,7 +195,7 @@ def _lab_examination(effort: Workload) -> Result:
 
 LAB_EXAMINATION = Study(
     "lab_examination", "The lab's examination", "The table of goals",
-    "Counts of cases as the last published examination had them; the intervals are computed from them.",
+    "Counts of cases from the last published examination; the intervals are computed from them.",
     _lab_examination,
     items=(Item("the lab's examination", Word.NOT_REPRODUCIBLE,
                 "It is our own, takes hours and was not repeated here; its counts are shown with their intervals."),),

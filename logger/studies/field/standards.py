@@ -22,7 +22,7 @@ from logger.vehicle.models import GOLDEN_CAR, quarter_car
 from logger.vehicle.structure import straight_step
 
 PRINTED_IRI_CHECK_PROFILE = ((2.0, 3.77380), (4.75, 7.84294), (10.0, 5.08670), (20.0, 2.95143), (30.0, 2.04955))
-"""Distance [m] and the IRI from 0 to there [m/km], five of the 120 printed."""
+"""Distance [m] and the IRI from 0 to that distance [m/km], five of the 120 printed."""
 
 
 def _iri_check_profile(effort: Workload) -> Result:
@@ -39,23 +39,24 @@ def _iri_check_profile(effort: Workload) -> Result:
     values += about("IRI input coefficient",
                     [Value("first input coefficient at 0.25 m", 5.476107e-3, exact, 5e-10, Word.MISPRINT)])
     peak = int(running.argmax())
-    table = Table("Where the running IRI is largest", (
+    table = Table("The running IRI at five places", (
         Column("printed [m]", ".2f"), Column("ours [m]", ".2f"), Column("ours [m/km]", ".5f")),
         ((4.75, float(at_m[peak + 1]), float(running[peak])),))
-    verdict = ("The running IRI of the pulse agrees to the last printed figure (all 120 values, within 7e-6 m/km). The "
-               "first coefficient of the printed input is too small by 1e-7: with it a road of constant slope would "
-               "have an IRI above 0, so the exact one is used.")
+    verdict = ("The running IRI of the pulse agrees to the last printed digit (all 120 values, within 7e-6 m/km). The "
+               "first printed input coefficient is too small by 1e-7: a road of constant slope would have an IRI "
+               "above 0, so the exact value is used.")
     printed_m, printed_iri = np.array(PRINTED_IRI_CHECK_PROFILE, dtype=np.float64).T
-    picture = Picture(Curves("Running IRI of the pulse", "distance [m]", "IRI from 0 to there [m/km]", (
+    picture = Picture(Curves("Running IRI of the pulse", "distance [m]", "IRI from 0 to that distance [m/km]", (
         Line("ours", np.array(at_m[1:], dtype=np.float64), running),
-        Line("printed", printed_m, printed_iri, dots=True))), "a table of 120 running values, of which five are taken")
+        Line("printed", printed_m, printed_iri, dots=True))),
+        "a table of 120 running values, of which five are compared")
     return Result((table,), verdict, (picture,), tuple(values))
 
 
 IRI_CHECK_PROFILE = Study(
     "iri_check_profile", "The published check of an IRI program", "Pages 41 and 42",
     "A pulse of 20 mm over 4 m at 0.25 m spacing, without a moving average, as printed.", _iri_check_profile,
-    items=(Item("IRI check profile", Word.AGREES, "The running IRI agrees to the last figure."),
+    items=(Item("IRI check profile", Word.AGREES, "The running IRI agrees to the last digit."),
            Item("IRI input coefficient", Word.MISPRINT, "The first one is printed 1e-7 too small.")),
     source="Sayers, Gillespie, Paterson, World Bank Technical Paper 46, 1986")
 
@@ -80,9 +81,10 @@ def _golden_car_gain(effort: Workload) -> Result:
         Column("where"), Column("printed [m]", ".2f"), Column("ours [m]", ".2f"), Column("gain", ".2f")),
         tuple((name, 1 / theirs, 1 / mine, float(slope_gain(np.array([mine]), 0.0)[0]))
               for name, theirs, mine in zip(names, printed, ours, strict=True)))
-    verdict = ("Peaks and halves lie within 5 % of where they are printed, as near as they are read off a figure. "
-               f"At its peaks the gain is {gain[slow].max():.2f} and {gain[~slow].max():.2f}; waves shorter than "
-               f"{1 / falling:.2f} m or longer than {1 / rising:.0f} m count for less than half.")
+    verdict = ("The peaks and the half-gain points lie within 5 % of the printed ones, which is as closely as they "
+               f"can be read off a figure. At its peaks the gain is {gain[slow].max():.2f} and "
+               f"{gain[~slow].max():.2f}; waves shorter than {1 / falling:.2f} m or longer than {1 / rising:.0f} m "
+               "count for less than half.")
     picture = Picture(Curves("Gain of the IRI's car at 80 km/h, for slopes", "wave number [cycle/m]", "gain", (
         Line("ours", wave_number, gain),
         Line("printed, half", np.array(printed_halves_cpm), np.full(2, 0.5), dots=True)), log_x=True),
@@ -91,7 +93,7 @@ def _golden_car_gain(effort: Workload) -> Result:
 
 
 GOLDEN_CAR_GAIN = Study(
-    "golden_car_gain", "To which waves the IRI listens", "Response of the IRI filter",
+    "golden_car_gain", "Waves to which the IRI responds", "Response of the IRI filter",
     "Computed for the Golden Car as a continuous system, without the moving average.", _golden_car_gain,
     items=(Item("Golden Car gain curve", Word.AGREES, "Peaks and half gains lie where they are printed, within 5 %."),),
     source="Sayers and Karamihas, The Little Book of Profiling, University of Michigan, 1998")
@@ -123,15 +125,15 @@ def _iso_2631_factors(effort: Workload) -> Result:
     table = Table("The misprint", (Column("frequency [Hz]"), Column("printed", ".0f"), Column("ours", ".1f"),
                                    Column("neighbours, printed")), (("10", wrong.printed, wrong.ours, "253 and 161"),))
     verdict = (f"Of {len(values)} factors all but one agree to the printed digit, {np.mean(off):.2f} off on average; "
-               "they are those of the formula at the nominal frequencies. Wd at 10 Hz is printed 212; the formula "
-               "has 202, and so has a smooth curve through its neighbours.")
+               "they are those of the formula at the nominal frequencies. Wd at 10 Hz is printed as 212; the formula "
+               "gives 202, and so does a smooth curve through the neighbours.")
     at_hz = np.array(HZ, dtype=float)
     picture = Picture(Curves("Factors of Wk and Wd", "frequency [Hz]", "factor times 1000", tuple(
         line for name, weighting in (("wk", WK), ("wd", WD)) for line in (
             Line(f"{name}, ours", at_hz, 1000 * np.abs(weighting.response(at_hz))),
             Line(f"{name}, printed", at_hz, np.array(PRINTED_ISO_2631_FACTORS[name], dtype=float), dots=True))),
             log_x=True, log_y=True),
-        "a table of factors from 0.02 to 400 Hz, of which those of 0.5 to 80 Hz are taken")
+        "a table of factors from 0.02 to 400 Hz, of which those from 0.5 to 80 Hz are compared")
     return Result((table,), verdict, (picture,), tuple(values))
 
 
@@ -139,7 +141,8 @@ ISO_2631_FACTORS = Study(
     "iso_2631_factors", "Factors of Wk and Wd at one-third-octave frequencies", "Table 3",
     "The magnitude of the weightings' formulas at the nominal frequencies from 0.5 to 80 Hz.", _iso_2631_factors,
     items=(Item(_ITEMS["wk"], Word.AGREES, "Every factor agrees to the printed digit."),
-           Item(_ITEMS["wd"], Word.MISPRINT, "All factors agree but that at 10 Hz, which is printed 212 for 202.")),
+           Item(_ITEMS["wd"], Word.MISPRINT, "All factors agree except that at 10 Hz, which is printed as 212 instead "
+                                             "of 202.")),
     source="ISO 2631-1:1997, Mechanical vibration and shock: evaluation of human exposure to whole-body vibration")
 
 
@@ -174,14 +177,14 @@ def _iso_8041_bursts(effort: Workload) -> Result:
     table = Table("Bursts, weighted r.m.s.", (Column("teeth"), Column("weighting"), Column("printed [m/s2]", ".5f"),
                                               Column("ours [m/s2]", ".5f"), Column("off by", "+.2%")), tuple(rows))
     worst = {name: max(abs(row[4]) for row in rows if row[1] == name) for name in found}
-    verdict = (f"Wk agrees within {worst['wk']:.2%}, Wd within {worst['wd']:.2%}. The weighting is the formula of the "
-               "standard itself on the whole record; a plain bilinear transform at 100 Hz is off by more above 8 Hz.")
+    verdict = (f"Wk agrees within {worst['wk']:.2%}, Wd within {worst['wd']:.2%}. ridelog applies the formula of the "
+               "standard to the whole record; a plain bilinear transform at 100 Hz is less accurate above 8 Hz.")
     at = np.array(teeth_counts[:-1], dtype=float)
     lines = [Line(f"{name}, {who}", at, np.array(one[:-1]), dots=who == "printed") for name in found
              for who, one in (("ours", found[name]), ("printed", PRINTED_MPS2[name]))]
-    picture = Picture(Curves("Weighted r.m.s. of bursts by their teeth", "teeth in 10 s", "weighted r.m.s. [m/s2]",
-                             tuple(lines), log_x=True, log_y=True),
-                      "a table of responses to bursts of 1 to 16 teeth, and to teeth without end")
+    picture = Picture(Curves("Weighted r.m.s. of bursts by the number of teeth", "teeth in 10 s",
+                             "weighted r.m.s. [m/s2]", tuple(lines), log_x=True, log_y=True),
+                      "a table of responses to bursts of 1 to 16 teeth, and to a continuous train")
     return Result((table,), verdict, (picture,), tuple(values))
 
 
