@@ -296,7 +296,7 @@ class NmeaDecoder:
                 return f"it sends {self._recent.sentence_kinds()}, but no {what}, so {harm}: have it send {sentences}"
         if len(self._long_intervals_us) == TELLING_INTERVALS:
             return (f"it sends only each {min(self._long_intervals_us) / US_PER_S:.0f} s, too seldom to know the "
-                    "motion between, so rows have no place: have it send RMC each second")
+                    "motion in between, so rows have no place: have it send RMC each second")
         if self._too_early_us is None:
             return ""
         day = self._too_early_us // DAY_US

@@ -51,7 +51,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                            help=f"{words} (folder: {folder})")
     parser.add_argument("--out", metavar="DIR", type=Path, help=f"folder for what is written (default: {DRIVE_DIR})")
     parser.add_argument("--unpack", action="store_true",
-                        help="with --lab, --field or --car: only write the drives, to find it yourself")
+                        help="with --lab, --field or --car: only write the drives, so that you can find the answer "
+                             "yourself")
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 
 

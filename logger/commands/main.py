@@ -226,12 +226,16 @@ def run() -> NoReturn:
         status = EXIT_PIPE_CLOSED
     except OSError as error:
         place = f"{error.filename}: " if error.filename else ""
-        status = _complain(f"{place}{error.strerror or error}", EXIT_BAD_INPUT)
+        status = _complain(f"{place}{_NOT_THAT.get(type(error), error.strerror or error)}", EXIT_BAD_INPUT)
     except MemoryError:
         status = _complain("not enough memory for so much data; cut it into shorter files", EXIT_BAD_INPUT)
     except KeyboardInterrupt:
         status = EXIT_INTERRUPTED
     sys.exit(status)
+
+
+_NOT_THAT: dict[type[OSError], str] = {FileExistsError: "expected a folder, found a file",
+                                       IsADirectoryError: "expected a file, found a folder"}
 
 
 def _complain(message: str, status: int) -> int:

@@ -61,7 +61,7 @@ def ingest_json(counts: Counts, rows: int) -> dict[str, Any]:
 def _left_out(counts: Counts) -> list[LeftOut]:
     return [damaged(counts.damaged_lines), *(LeftOut(number, "row", why) for number, why in (
         (counts.repeated, "that are known already"),
-        (counts.contradictions, "at odds with a known one of the same number and time; the first one stays"),
+        (counts.contradictions, "that contradict a known one of the same number and time; the first one is kept"),
         (counts.undated, "without a date"), (counts.unplaced, "without a place or a direction"),
         (counts.trimmed, "cut at the ends of drives")))]
 

@@ -231,7 +231,7 @@ class _FitProblem:
         self.exact = self.model.exact
         self.observed = [self.low_pass.apply(one) for one in self.measured]
         if not any(one.any() for one in self.measured):
-            raise ValueError("expected measurements that move, found nothing but 0")
+            raise ValueError("expected measurements that vary, found nothing but 0")
         self.floor = least_share(self.model) * float(np.sqrt(np.mean(np.concatenate(self.observed) ** 2)))
         self.plain = White().fitted(self.observed, np.empty(0), self.low_pass, self.floor)
         self._linearised: _Linearised | None = None

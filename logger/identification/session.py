@@ -52,7 +52,7 @@ def located(vehicle: Vehicle, record: Run, road: RoadInput, part: str) -> float:
     if not np.ptp(way_m) > 0:
         raise ValueError(f"{part}: expected a drive over it, found a car that stands")
     if count > _MOST_PLACES:
-        raise ValueError(f"{part}: expected a start_m, as {last_m - first_m:g} m are too many to look for it on")
+        raise ValueError(f"{part}: expected a start_m, as {last_m - first_m:g} m are too long to look for it")
     place = f"{part}.start_m"
     model = VehicleModel(vehicle, [Free(place, first_m, first_m - 1, last_m + 1, place=True)], [record], road)
     without: Any = {part: None}
@@ -92,8 +92,8 @@ def check_records(records: Sequence[Run]) -> None:
     """``UnusableRun`` for an acceleration that never changes, that gravity is in, or whose samples repeat."""
     for run, record in enumerate(records):
         if not np.ptp(record.kept_mps2) > 0:
-            raise UnusableRun(run, "expected an acceleration that moves, "
-                                   f"found {record.kept_mps2[0]:g} m/s2 all along")
+            raise UnusableRun(run, f"expected an acceleration that varies, found {record.kept_mps2[0]:g} m/s2 "
+                                   "throughout")
         mean_mps2 = float(record.measured_mps2.mean())
         if record.facts.main.measures == "acceleration" and abs(mean_mps2) > _LARGEST_MEAN_MPS2:
             raise UnusableRun(run, f"expected gravity removed from the acceleration, found {mean_mps2:.2f} m/s2 on "
@@ -115,7 +115,7 @@ def drives_of(records: Sequence[Run]) -> list[RoadDrive]:
         drives.append(RoadDrive(record.rate_hz, record.kept_mps2, record.distance_m[record.first:]))
         length_m = float(drives[-1].distance_m.max() - drives[-1].distance_m.min())
         if not _LEAST_WAY_M <= length_m <= _MOST_WAY_M:
-            raise UnusableRun(run, f"expected {_LEAST_WAY_M:g} to {_MOST_WAY_M:g} m of way, found {length_m:g} m")
+            raise UnusableRun(run, f"expected {_LEAST_WAY_M:g} to {_MOST_WAY_M:g} m of driving, found {length_m:g} m")
     return drives
 
 

@@ -204,7 +204,7 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
     search, selection = search_effects(posterior, effects, present, progress)
     below = below_filter_without_delay(search, selection)
     if below is not None:
-        progress("the records were filtered forth and back: searching below that")
+        progress("the records were filtered forwards and backwards: searching below that frequency")
         posterior = below
         search, selection = search_effects(posterior, effects, present, progress)
     return assess(posterior, effects, present, search, selection)
@@ -319,11 +319,11 @@ def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: S
         if why is None and all({one.kind, one.measures} & set(effect.not_of) for one in sensors):
             why = f"no {' or '.join(sorted({one.kind or f'sensor of {one.measures}' for one in sensors}))} has it"
         if why is None and all(one.measures in effect.found_of for one in sensors):
-            why = f"of a {' or '.join(sorted({one.measures for one in sensors}))} it is found with the rest"
+            why = f"of a {' or '.join(sorted({one.measures for one in sensors}))} it is always estimated"
         if why is None and isinstance(effect, SensorEffect) and all(run.begins_freely for run in runs):
-            why = "nothing drives the run: another initial state would have the same influence as this sensor effect"
+            why = "nothing drives the run: another initial state would look the same as this sensor effect"
         if why is None and effect.against_ground and at_rest:
-            why = "its base is at rest: a force against the ground is also one against the base"
+            why = "its base is at rest, so a force against the ground equals one against the base"
         if why is None and by_road and not effect.reshapes:
             why = LAID_BY_THE_ROAD
         if why is not None:
@@ -376,7 +376,7 @@ def _steps(selection: Selection, nominal_error: float) -> tuple[ErrorStep, ...]:
     steps += [ErrorStep(f"with {name}", hold_out.error) for name, hold_out in selection.steps]
     last = selection.steps[-1][1] if selection.steps else selection.before.hold_out
     if selection.now.hold_out is not last:
-        steps.append(ErrorStep("as it ends", selection.now.hold_out.error))
+        steps.append(ErrorStep("with the final model", selection.now.hold_out.error))
     return tuple(steps)
 
 

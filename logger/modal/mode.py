@@ -153,7 +153,7 @@ def judge(found: OrderPoles, covariance: Array, larger: list[OrderPoles], scale:
         width = abs(pole.real) + 2 * np.pi / duration_s
         reason = _why_not(complex(pole), frequency_std, damping_std, moves, len(near))
         if reason or np.trace(both) > width**2:
-            reason = reason or "its frequency is less certain than its resonance is wide"
+            reason = reason or "its frequency is less certain than the width of its resonance"
             rejected.append(Rejected(frequency, ratio, reason))
         else:
             shape = normalised(found.shapes[:, k] * scale)

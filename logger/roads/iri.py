@@ -198,7 +198,8 @@ class IriWindows:
 
     def __init__(self, spacing_m: float, window_m: float) -> None:
         if not spacing_m <= window_m < float("inf"):
-            raise ValueError(f"expected a window of at least the {spacing_m:g} m between samples, found {window_m:g} m")
+            raise ValueError(f"expected a finite window of at least the {spacing_m:g} m between samples, found "
+                             f"{window_m:g} m")
         self._spacing_m = spacing_m
         self._window_m = window_m
         self._number = 0
@@ -240,7 +241,8 @@ class IriWindows:
 def _steps(distance_m: float, spacing_m: float) -> float:
     """Distance in steps; a whole number where rounding alone keeps it from being one."""
     steps = float(distance_m / spacing_m)
-    return float(round(steps)) if abs(steps - round(steps)) < _NEARLY else steps
+    nearest = float(np.rint(steps))
+    return nearest if abs(steps - nearest) < _NEARLY else steps
 
 
 def _mean_between(slope: Array, start: float, stop: float) -> float:

@@ -171,8 +171,8 @@ class Repetition:
         """What is wrong with the samples that come, and what to do; empty: nothing."""
         if not self.share:
             return ""
-        return (f"{100 * self.share:.0f} of 100 samples repeat the one before: no figures are made of them. Have the "
-                "sensor, or its bridge, send each reading once")
+        return (f"{100 * self.share:.0f} of 100 samples repeat the one before: ridelog computes nothing from them. "
+                "Have the sensor, or its bridge, send each reading once")
 
     def _judge(self, t_us: npt.NDArray[np.int64], accel_mps2: npt.NDArray[np.float64]) -> None:
         share = float((~fresh_samples(accel_mps2)[1:]).mean())

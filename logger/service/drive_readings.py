@@ -74,7 +74,7 @@ class RangeUse:
         for (setting, _), beyond in zip(self._others.finer, self._beyond / max(self._blocks, 1), strict=True):
             if beyond < CLIPPED_SHARE:
                 seldom = f"only {beyond:.1%} of this drive" if beyond else "nothing of this drive"
-                return self._said(f"{seldom} would have been beyond a smaller range, and its steps are finer", setting)
+                return self._said(f"{seldom} would have exceeded a smaller range, which has finer steps", setting)
         if hidden > HIDDEN_SHARE:
             return self._said(f"{hidden:.0%} of this drive's windows move by less than one of its steps",
                               self._others.oftener)

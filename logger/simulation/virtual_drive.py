@@ -92,7 +92,7 @@ def recorded_distance(car: Car, distance_m: Array) -> Array:
         recorded_m = recorded_m + missing_m
         if not np.abs(missing_m).max() > _NEARLY_M:
             return recorded_m
-    raise ValueError("no recorded distance would stand for where the car was")
+    raise ValueError("the recorded distance would not say where the car was")
 
 
 _KEPT_PASSAGES = 6

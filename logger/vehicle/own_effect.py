@@ -65,18 +65,18 @@ def watched(effect: Effect, blame: Blame) -> Effect:
         with blame():
             why = effect.obstacle(vehicle, two_tracks)
             if why is not None and not (isinstance(why, str) and why.strip()):
-                raise ValueError(f"expected obstacle to answer with words or None, found {why!r}")
+                raise ValueError(f"expected obstacle to return words or None, found {why!r}")
         return why
 
     def trials(seen: Misalignment | None = None) -> list[dict[str, float]]:
         with blame():
             some: object = effect.trials(seen)
             if not isinstance(some, list) or not some or not all(isinstance(one, Mapping) for one in some):
-                raise ValueError("expected trials to answer with a list of values by the names of the parameters, as "
+                raise ValueError("expected trials to return a list of values by the names of the parameters, as "
                                  f"in [{{...}}], found {some!r}")
             for number, value in (pair for one in some for pair in one.items()):
                 if not isinstance(value, Real):
-                    raise ValueError(f"expected trials to answer with a number as {number}, found {value!r}")
+                    raise ValueError(f"expected trials to return a number as {number}, found {value!r}")
             return [effect.checked(one) for one in some]
 
     vars(found).update({name: asked, "obstacle": obstacle, "trials": trials})
@@ -95,7 +95,7 @@ def _looked_at(name: str, found: Any, given: Any, blame: Blame) -> Any:
     if isinstance(given, Vehicle):
         for number, value in _plain_numbers(_kept(name, found, Vehicle)):
             if not np.isfinite(value):
-                raise ValueError(f"expected {name} to answer with finite numbers, found {number} {value}")
+                raise ValueError(f"expected {name} to return finite numbers, found {number} {value}")
         _check_stands(structure_of(found), name)
         return found
     if isinstance(given, Structure):
@@ -138,7 +138,7 @@ def _watched_laws(found: CornerLaws, before: CornerLaws, blame: Blame) -> Corner
 
 def _kept(name: str, found: Any, kind: type) -> Any:
     if not isinstance(found, kind):
-        raise ValueError(f"expected {name} to answer with a {kind.__name__}, found {type(found).__name__}")
+        raise ValueError(f"expected {name} to return a {kind.__name__}, found {type(found).__name__}")
     return found
 
 
@@ -146,12 +146,12 @@ def _numbers(name: str, found: npt.ArrayLike, like: npt.NDArray[Any]) -> npt.NDA
     """An answer as numbers of the kind and shape of ``like``."""
     numbers = np.asarray(found)
     if numbers.shape != like.shape:
-        raise ValueError(f"expected {name} to answer with an array of shape {like.shape}, as it was asked, found one "
+        raise ValueError(f"expected {name} to return an array of shape {like.shape}, as it was asked, found one "
                          f"of shape {numbers.shape}")
     if not np.can_cast(numbers.dtype, like.dtype, "same_kind"):
-        raise ValueError(f"expected {name} to answer with {like.dtype} numbers, found {numbers.dtype}")
+        raise ValueError(f"expected {name} to return {like.dtype} numbers, found {numbers.dtype}")
     if not np.isfinite(numbers).all():
-        raise ValueError(f"expected {name} to answer with finite numbers")
+        raise ValueError(f"expected {name} to return finite numbers")
     return np.asarray(numbers, like.dtype)
 
 
@@ -169,7 +169,7 @@ def _check_stands(structure: Structure, name: str) -> None:
     """ValueError for a car that has no weight, or does not stand on its springs."""
     for what, matrix in (("masses", structure.mass), ("springs", structure.stiffness)):
         if not np.linalg.eigvalsh(matrix)[0] > 0:
-            raise ValueError(f"expected {name} to answer with a car whose {what} are all above 0")
+            raise ValueError(f"expected {name} to return a car whose {what} are all above 0")
 
 
 def _check_numbers(laws: CornerLaws, before: CornerLaws) -> None:
@@ -179,7 +179,7 @@ def _check_numbers(laws: CornerLaws, before: CornerLaws) -> None:
         value = getattr(laws, name)
         infinite = name == "mount_n_per_m" and value == np.inf
         if not (infinite or (np.ndim(value) == 0 and np.isfinite(value) and value >= 0)):
-            raise ValueError(f"expected laws to answer with {name} of 0 or more, found {value}")
+            raise ValueError(f"expected laws to return {name} of 0 or more, found {value}")
     for name, other in (("damping_n_s_per_m", "another damper is replace(laws, damper=...)"),
                         ("stiffness_n_per_m", "another spring is laws.with_spring(...)")):
         if getattr(laws, name) != getattr(before, name):
@@ -189,11 +189,11 @@ def _check_numbers(laws: CornerLaws, before: CornerLaws) -> None:
     for name in ("springs", "others", "tires"):
         some = getattr(laws, name)
         if not isinstance(some, tuple) or not all(map(callable, some)):
-            raise ValueError(f"expected laws to answer with a tuple of functions as {name}, found {some!r}")
+            raise ValueError(f"expected laws to return a tuple of functions as {name}, found {some!r}")
     if not isinstance(laws.motions, tuple) or not all(isinstance(one, MotionLaw) for one in laws.motions):
-        raise ValueError(f"expected laws to answer with a tuple of MotionLaw as motions, found {laws.motions!r}")
+        raise ValueError(f"expected laws to return a tuple of MotionLaw as motions, found {laws.motions!r}")
     if not callable(laws.damper):
-        raise ValueError(f"expected laws to answer with a function as damper, found {laws.damper!r}")
+        raise ValueError(f"expected laws to return a function as damper, found {laws.damper!r}")
 
 
 # Motions that a law is tried at: up to what tables of other laws reach to, each as far as it usually goes, and rest.
@@ -225,7 +225,7 @@ def _check_motion(law: MotionLaw) -> None:
             if law.rates is not None:
                 found = law.rates(law.p, seen)
                 if not isinstance(found, tuple) or len(found) != len(memory):
-                    raise ValueError(f"expected rates to answer with a tuple of {len(memory)}, one number for each "
+                    raise ValueError(f"expected rates to return a tuple of {len(memory)}, one number for each "
                                      f"state, as in (rate,), found {found!r}")
                 for one in found:
                     _numbers("rates", one, np.zeros(()))

@@ -40,7 +40,7 @@ _STEPS = np.arange(_BLOCK)
 def matrix_exponential(a: Array) -> Array:
     """exp(a) of a square matrix, by scaling, a Taylor series to rounding error, and squaring."""
     if not np.isfinite(a).all():
-        raise np.linalg.LinAlgError("expected finite numbers of a car")
+        raise np.linalg.LinAlgError("expected finite parameters of a car")
     squarings = max(0, int(np.ceil(np.log2(max(np.abs(a).sum(axis=1).max(), 1e-300)))) + 2)
     scaled = a / 2.0**squarings
     result = term = np.eye(len(a))

@@ -113,7 +113,7 @@ def test_a_ride_with_a_blow_says_what_to_use(tmp_path: Path, capsys: pytest.Capt
 
 
 def test_silence_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    with pytest.raises(BadInput, match="expected accelerations that move, found 0 m/s2 all along"):
+    with pytest.raises(BadInput, match="expected accelerations that vary, found 0 m/s2 throughout"):
         as_json(capsys, sine(tmp_path / "still.csv", 100.0, 5.0, {"z": 0.0}))
 
 

@@ -83,7 +83,7 @@ def test_a_record_that_never_changes_is_reported(comfort, level: float) -> None:
 def test_a_record_of_zeros_is_refused(comfort) -> None:
     status, _, complaints = comfort(EVEN_S, np.zeros_like(EVEN_S))
     assert (status, len(complaints)) == (2, 1)
-    assert "found 0 m/s2 all along" in complaints[0]
+    assert "found 0 m/s2 throughout" in complaints[0]
 
 
 def test_a_file_behind_the_bare_option_is_no_rate() -> None:

@@ -373,7 +373,7 @@ def test_the_mass_of_a_fixture_is_told_from_an_early_force(damping: str, tmp_pat
     fixture = found["candidates"][0]
     assert abs(fixture["parameters"]["mass_kg"] - 3.0) < 3 * fixture["standard_errors"]["mass_kg"] < 0.3
     (tmp_path / "part.yaml").write_text(f"{text}mass_kg: 2 +- 50%\npreload_n: unknown\n")
-    with pytest.raises(BadInput, match=r"payload.*its mass is a number of its file"):
+    with pytest.raises(BadInput, match=r"payload.*its mass is a parameter of its file"):
         main(["add-effect", "payload", "--vehicle", str(tmp_path / "part.yaml"), "--out", str(tmp_path / "with.yaml"),
               str(run)])
 

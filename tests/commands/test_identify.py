@@ -109,8 +109,8 @@ def other_run(run: str, folder: Path, change: Callable[[Array], Array]) -> str:
 
 
 @pytest.mark.parametrize(("change", "message"), [
-    (lambda z: 0 * z, "expected an acceleration that moves, found 0 m/s2 all along"),
-    (lambda z: 0 * z - 0.4, "expected an acceleration that moves, found -0.4 m/s2 all along"),
+    (lambda z: 0 * z, "expected an acceleration that varies, found 0 m/s2 throughout"),
+    (lambda z: 0 * z - 0.4, "expected an acceleration that varies, found -0.4 m/s2 throughout"),
     (lambda z: np.repeat(np.round(z[::3], 3), 3)[: len(z)], "expected every sample to be a new measurement, found "
                                                             "6[0-9]%"),
     (lambda z: z + 9.81, "expected gravity removed from the acceleration, found 9.8[0-9] m/s2 on average"),

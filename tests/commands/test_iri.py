@@ -118,7 +118,7 @@ def test_uneven_spacing_is_refused_or_resampled_on_request(
     (44, 0.25, [], "expected a profile of at least 11 m, found 10.75 m"),
     (400, 0.5, [], "expected samples at most 0.3 m apart, found 0.5 m"),
     (400, 0.25, ["--resample", "0.31"], "expected samples at most 0.3 m apart, found 0.31 m"),
-    (400, 0.25, ["--window", "0.1"], "expected a window of at least the 0.25 m between samples, found 0.1 m"),
+    (400, 0.25, ["--window", "0.1"], "expected a finite window of at least the 0.25 m between samples, found 0.1 m"),
 ])
 def test_what_has_no_iri_is_refused_by_name(
     tmp_path: Path, count: int, spacing_m: float, arguments: list[str], message: str

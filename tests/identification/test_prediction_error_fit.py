@@ -163,7 +163,7 @@ def test_what_is_not_asked_right() -> None:
 
 def test_records_of_nothing_but_zeros() -> None:
     model = VehicleModel(CAR, [free(CAR, MASS)], [BUMP])
-    with pytest.raises(ValueError, match="expected measurements that move, found nothing but 0"):
+    with pytest.raises(ValueError, match="expected measurements that vary, found nothing but 0"):
         fit(model, [np.zeros_like(model.measured[0])])
 
 

@@ -47,9 +47,9 @@ def used(range_g: int, reads: int, clipped: float = 0.0, hidden: float = 0.0, be
     (2, 4, 0.30, 0.0, 1.0, "it clipped in 30% of this drive's windows: set range_g: 4"),
     (4, 4, 0.30, 0.0, 1.0, "set range_g: 8"),
     (8, 4, 0.9, 0.0, 1.0, ""),  # steps at 16 g say nothing
-    (4, 4, 0.0, 0.0, 0.0, "nothing of this drive would have been beyond a smaller range, and its steps are finer: set "
+    (4, 4, 0.0, 0.0, 0.0, "nothing of this drive would have exceeded a smaller range, which has finer steps: set "
                           "range_g: 2"),
-    (8, 1, 0.0, 0.5, 0.01, "only 1.0% of this drive would have been beyond a smaller range, and its steps are finer: "
+    (8, 1, 0.0, 0.5, 0.01, "only 1.0% of this drive would have exceeded a smaller range, which has finer steps: "
                            "set range_g: 4"),
     (4, 4, 0.0, 0.02, 0.4, ""),
     (4, 4, 0.0, 0.10, 0.4,

@@ -373,7 +373,7 @@ def test_the_corners_of_a_half_car_take_them() -> None:
     ("def pull(p, seen):\n    return 3.0 / (p.size - 2)\n", "Between.BODY_AND_WHEEL, pull, p", ":7: ZeroDivisionError"),
     ("def pull(p, seen):\n    return seen.weel_mps\n", "Between.BODY_AND_WHEEL, pull, p", ":7: AttributeError: 'Seen'"),
     ("def pull(p, seen):\n    return np.log(-p.size)\n", "Between.BODY_AND_WHEEL, pull, p",
-     "expected force to answer with finite numbers"),
+     "expected force to return finite numbers"),
     ("def pull(p, seen):\n    return eval('1.0')\n", "Between.BODY_AND_WHEEL, pull, p", "can be compiled: Untyped"),
     ("", "Between.BODY_AND_WHEEL, lambda p, seen: self.size, p", "that knows its numbers by p alone"),
     ("", "Between.BODY_AND_WHEEL, lambda p: 1.0, p", "expected force to be a function of (p, seen)"),
@@ -383,7 +383,7 @@ def test_the_corners_of_a_half_car_take_them() -> None:
     ("def pull(p, seen):\n    return 1.0\n", "Between.BODY_AND_WHEEL, pull, p, pull, (0.0, 0.0, 0.0)",
      "a tuple of at most 2 finite numbers"),
     ("def pull(p, seen):\n    return 1.0\n", "Between.BODY_AND_WHEEL, pull, p, pull, (0.0,)",
-     "rates to answer with a tuple of 1, one number for each state, as in (rate,), found 1.0"),
+     "rates to return a tuple of 1, one number for each state, as in (rate,), found 1.0"),
 ])
 def test_a_law_that_will_not_do_is_refused_with_its_file(tmp_path: Path, functions: str, arguments: str, words: str,
                                                          ) -> None:

@@ -171,7 +171,7 @@ class RoadProblem:
             if len(road.drives) > 1 and together > max(_MORE_TOGETHER * alone, _LITTLE * road.size_mps2):
                 where = f"road {number}" if len(self.roads.roads) > 1 else "one road"
                 words = (f"the drives do not agree on {where}: together they leave {together:.2g} m/s2, each by itself "
-                         f"{alone:.2g}. {NOT_ONE_ROAD}; take them for roads of their own.")
+                         f"{alone:.2g}. {NOT_ONE_ROAD}; treat them as different roads.")
                 return [Finding(APART, {}, words)]
         return []
 

@@ -419,7 +419,7 @@ class _LawChoice:
         without = self.search.without(model, best.draft.name)
         names = [name for name in best.draft.family.related_effects
                  if name in self.known and name not in without.state.names]
-        self.search.progress(f"what known effect comes near {best.draft.family.title}")
+        self.search.progress(f"which known effect comes close to {best.draft.family.title}")
         with ThreadPoolExecutor(self.search.workers) as pool:
             tries = list(pool.map(lambda name: fit_roughly(
                 without.score, without, screen(without, self.known[name], [self.search.misalignment]))[0], names))

@@ -34,8 +34,8 @@ class _ForthAndBack(SensorBandwidth):
     and order are those of each way."""
 
     name = "filter_without_delay"
-    title = "a low-pass that was run forth and back"
-    signature = "the measurement falls behind the model more and more as the frequency rises, and comes no later"
+    title = "a low-pass that was run forwards and backwards"
+    signature = "the higher the frequency, the smaller the measurement is beside the model, but without delay"
     shown_by = "look at the records as they were recorded"
     realigns = False
 
@@ -58,7 +58,7 @@ def below_filter_without_delay(search: Search, found: Selection) -> Posterior | 
     than the slow sensor that a search found; None: none does, or next to nothing is left below it."""
     if _IMITATED_BY not in found.gains:
         return None
-    search.progress(f"is it {_IMITATED_BY}, or were the records filtered forth and back?")
+    search.progress(f"is it {_IMITATED_BY}, or were the records filtered forwards and backwards?")
     best = _fitted(search, found)
     if best is None or best.gain < found.gains[_IMITATED_BY] + INDISTINGUISHABLE:
         return None

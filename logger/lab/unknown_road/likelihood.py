@@ -203,8 +203,8 @@ class SameRoad:
         self.stretches = _cut(self.runs, least_s)
         shared = {run for parts in self.stretches for run, _ in parts}
         if alone := [run.name for number, run in enumerate(self.runs) if number not in shared]:
-            raise NotOneRoad(f"{' and '.join(alone)}: expected drives over the same road, found no {least_s:g} s of "
-                             "it that another drive was over too, by their distances")
+            raise NotOneRoad(f"{' and '.join(alone)}: expected drives over the same road, found no {least_s:g} s that "
+                             "it shares with another drive, by their distances")
         self.motions = [DriveConditions(float(np.median(np.gradient(one.distance_m)) * self.rate_hz), 0.0,
                                         STANDARD_WAVINESS)
                         for parts in self.stretches for _, one in parts]

@@ -88,7 +88,8 @@ def _load(path: Path) -> list[_Matrix]:
         raise BadInput(f"{path}: expected a .mat file up to version 7, found version 7.3: save it with -v7")
     order = _ORDERS.get(data[126:128])
     if not data.startswith(b"MATLAB") or order is None:
-        raise BadInput(f"{path}: expected a .mat file of version 5 to 7, found another beginning: save it with -v7")
+        raise BadInput(f"{path}: expected a .mat file of version 5 to 7, found a different file header: save it with "
+                       "-v7")
     try:
         return list(_matrices(data, 128, len(data), order))
     except (ValueError, struct.error, zlib.error) as error:
@@ -154,7 +155,7 @@ def _matrix(data: bytes, begin: int, stop: int, order: str, depth: int) -> _Matr
         return _Matrix(name, None, False, tuple(_matrices(data, begin, stop, order, depth=depth + 1)))
     kind, first, last = parts[3] if len(parts) > 3 else (9, stop, stop)
     if kind not in _NUMBERS or flags & is_complex:
-        raise ValueError(f"numbers of a kind that there is not, {kind}, or complex ones")
+        raise ValueError(f"numbers of an unknown kind, {kind}, or complex ones")
     form = np.dtype(order + _NUMBERS[kind])
     with np.errstate(invalid="ignore"):  # of numbers that are none
         numbers = np.frombuffer(data, form, (last - first) // form.itemsize, first).astype(np.float64)

@@ -123,7 +123,7 @@ def even_record(t_s: Array, accel: Mapping[str, Array], others: Mapping[str, Arr
     if moving is None or moving.any():
         driven = slice(None) if moving is None else moving
         if not samples[driven, 0].any():
-            raise BadInput(f"{file}: expected accelerations that move, found 0 m/s2 all along: a sensor that works "
+            raise BadInput(f"{file}: expected accelerations that vary, found 0 m/s2 throughout: a sensor that works "
                            "shows some noise at least; check that it was read")
         doubts += still_doubts(accel, t_s[driven], samples[driven], held[driven])
     if repeats is not None and asked.resample_hz is None:

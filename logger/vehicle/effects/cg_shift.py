@@ -20,7 +20,7 @@ class CgShift(VehicleEffect):
     )
     needs_wheel = True
     source = "rigid-body mechanics (Eq 4.12 of Blum 2015 with other distances)"
-    signature = "the record shows one axle more than the model does, and the other one less"
+    signature = "one axle shows more strongly in the record than in the model, the other one less"
     shown_by = "drive one bump at two speeds, or weigh the axles"
 
     def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:

@@ -17,8 +17,8 @@ class ConstantForce(ForceEffect):
         Parameter("push_n", 20.0, -1e4, 1e4, 0.0, Scale.LINEAR, (-20.0, 20.0), "up positive"),
     )
     source = "A. Janot, M. Gautier, M. Brunot, EMPS, Workshop on Nonlinear System Identification Benchmarks (2019)"
-    signature = "what moves freely drifts; on a spring that is not linear the motion one way differs from that back"
-    shown_by = "push it forth and back over its whole travel, weakly and strongly"
+    signature = "a free mass drifts; on a nonlinear spring the motion differs between the two directions"
+    shown_by = "push it back and forth over its whole travel, weakly and strongly"
     sought = Sought.ON_RIGS
     underlies = True
 

@@ -22,7 +22,7 @@ class DamperAsymmetry(ForceEffect):
         AXLE,
     )
     source = "J. C. Dixon, The Shock Absorber Handbook (2007), chapter 1: ratios of 2 to 3 are usual"
-    signature = "the body sits lower while it shakes; peaks up and down differ, and the record has twice each frequency"
+    signature = "the body sits lower while it shakes; upward and downward peaks differ; twice each frequency appears"
     shown_by = "drive single bumps and a rough road, so that the suspension moves fast both ways"
 
     def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:

@@ -16,10 +16,10 @@ class ForceLimit(ActuatorEffect):
     title = "a shaker, coil or motor that saturates"
     parameters = (
         Parameter("limit_n", 500.0, 1.0, 1e7, float("inf"), Scale.RECIPROCAL, (100.0, 500.0, 2500.0),
-                  "the most force that acts, of each that was recorded"),
+                  "largest force that acts, of each recorded force"),
     )
     source = "K. J. Astrom, L. Rundqwist, Proc. American Control Conference (1989) 1693: actuators that saturate"
-    signature = "strong pushes move it less than weak ones say, in proportion, at all frequencies alike"
+    signature = "strong pushes move it less, in proportion, than weak ones, at all frequencies"
     shown_by = "push it weakly and strongly with the same motion"
     sought = Sought.ON_RIGS
 

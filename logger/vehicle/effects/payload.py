@@ -20,7 +20,7 @@ class Payload(VehicleEffect):
                   "beyond the model's sprung mass; in a half car on one side"),
     )
     source = "Newton's second law; 4.4 of Blum 2015 finds the sprung mass from a bump"
-    signature = "the body bounces more slowly and shakes less above its bounce, on every road alike"
+    signature = "the body bounces more slowly and shakes less above its bounce frequency, on every road"
     shown_by = "drive a road with long waves, or weigh the car"
     needs_body = True
 
@@ -36,7 +36,7 @@ class _OfPart(Payload):
     needs_body = False
 
     def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:
-        return "its mass is a number of its file" if vehicle.sprung_mass_kg else None
+        return "its mass is a parameter of its file" if vehicle.sprung_mass_kg else None
 
 
 EFFECT = Payload()

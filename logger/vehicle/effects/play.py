@@ -18,7 +18,7 @@ class Play(ForceEffect):
     title = "play of the springs: in a seat, a bush or a joint"
     parameters = (
         Parameter("half_gap_m", 0.0005, 0.0, 0.02, 0.0, Scale.LINEAR, (0.0002, 0.0008, 0.003),
-                  "way from the middle in each direction, within which the spring does not answer"),
+                  "travel from the middle in each direction, within which the spring exerts no force"),
         AXLE,
     )
     source = "M. Nordin, P.-O. Gutman, Automatica 38 (2002) 1633: mechanical systems with backlash, dead zone"

@@ -46,32 +46,32 @@ ASKED = {"RoadEffect": "road(self, p, spacing_m, elevation_m)",
 BAD = "(np.nan if p.size == 3 else 1.0)"
 # What each kind does; at size 3 it fails or gives no answer, in these words.
 CASES = [
-    ("RoadEffect", "return elevation_m / (p.size - 3)", "expected road to answer with finite numbers"),
-    ("RoadEffect", "return elevation_m[:-1] if p.size == 3 else elevation_m", "expected road to answer with an array"),
-    ("DriveEffect", "return distance_m / (p.size - 3)", "expected driven to answer with finite numbers"),
-    ("DriveEffect", "return distance_m[:-1] if p.size == 3 else distance_m", "expected driven to answer with an array"),
+    ("RoadEffect", "return elevation_m / (p.size - 3)", "expected road to return finite numbers"),
+    ("RoadEffect", "return elevation_m[:-1] if p.size == 3 else elevation_m", "expected road to return an array"),
+    ("DriveEffect", "return distance_m / (p.size - 3)", "expected driven to return finite numbers"),
+    ("DriveEffect", "return distance_m[:-1] if p.size == 3 else distance_m", "expected driven to return an array"),
     ("DriveEffect", "return [{}[1] if p.size == 3 else one for one in distance_m]", ":16: KeyError: 1"),
-    ("VehicleEffect", f"return replace(vehicle, contact_patch_m={BAD})", "expected vehicle to answer with finite"),
+    ("VehicleEffect", f"return replace(vehicle, contact_patch_m={BAD})", "expected vehicle to return finite"),
     ("VehicleEffect", "return replace(vehicle, sprung_mass_kg=800 - 300 * p.size)", "whose masses are all above 0"),
     ("VehicleEffect", "return replace(vehicle, model='full_car' if p.size == 3 else vehicle.model)", "a full car"),
     ("VehicleEffect", "return replace(vehicle, front=replace(vehicle.front, cg_distance_m=1 / (3 - p.size)))",
      ":16: ZeroDivisionError"),
-    ("BodyEffect", f"return replace(structure, road=structure.road * {BAD})", "structure, in road, to answer with fin"),
+    ("BodyEffect", f"return replace(structure, road=structure.road * {BAD})", "structure, in road, to return fin"),
     ("BodyEffect", "return hung(structure, 9, 4e3 * (3 - p.size), 0, structure.body[:, 0])", "whose springs are all"),
-    ("BodyEffect", "return None if p.size == 3 else structure", "expected structure to answer with a Structure"),
-    ("ForceEffect", f"return laws.with_force(lambda x, v: {BAD} * v)", "expected a force to answer with finite"),
-    ("ForceEffect", "return laws.with_spring(lambda x: 0.0 if p.size == 3 else x)", "a spring to answer with an arr"),
-    ("ForceEffect", "return laws.with_tire(lambda d: 1e4j * d if p.size == 3 else d)", "expected a tire to answer"),
+    ("BodyEffect", "return None if p.size == 3 else structure", "expected structure to return a Structure"),
+    ("ForceEffect", f"return laws.with_force(lambda x, v: {BAD} * v)", "expected a force to return finite"),
+    ("ForceEffect", "return laws.with_spring(lambda x: 0.0 if p.size == 3 else x)", "a spring to return an arr"),
+    ("ForceEffect", "return laws.with_tire(lambda d: 1e4j * d if p.size == 3 else d)", "expected a tire to return"),
     ("ForceEffect", "return replace(laws, damper=lambda v: v.none if p.size == 3 else v)", ":16: AttributeError"),
     ("ForceEffect", f"return replace(laws, dry_friction_n={BAD})", "dry_friction_n of 0 or more, found nan"),
     ("ForceEffect", "return replace(laws, mount_n_per_m=2000.0 - 1000 * p.size)", "mount_n_per_m of 0 or more"),
     ("ForceEffect", "return replace(laws, damping_n_s_per_m=1.0 + p.size)", "leave damping_n_s_per_m as it was"),
     ("ForceEffect", "return replace(laws, stiffness_n_per_m=1.0 + p.size)", "leave stiffness_n_per_m as it was"),
     ("ForceEffect", "return replace(laws, springs=(3.0,))", "a tuple of functions as springs"),
-    ("SensorEffect", "return np.full_like(s, 1 / (p.size - 3) if p.size != 3 else np.inf)", "expected factor to answ"),
-    ("SensorEffect", "return np.ones(3) if p.size == 3 else np.ones(s.shape)", "expected factor to answer with"),
-    ("RecordEffect", "return recording.accel_z_mps2 / (p.size - 3)", "expected record to answer with finite numbers"),
-    ("RecordEffect", "return 1.0 if p.size == 3 else recording.time_s", "expected record to answer with an array of"),
+    ("SensorEffect", "return np.full_like(s, 1 / (p.size - 3) if p.size != 3 else np.inf)", "expected factor to retu"),
+    ("SensorEffect", "return np.ones(3) if p.size == 3 else np.ones(s.shape)", "expected factor to return"),
+    ("RecordEffect", "return recording.accel_z_mps2 / (p.size - 3)", "expected record to return finite numbers"),
+    ("RecordEffect", "return 1.0 if p.size == 3 else recording.time_s", "expected record to return an array of"),
 ]
 
 
@@ -106,7 +106,7 @@ def test_a_sum_of_own_and_other_laws_is_their_sum(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("more", "words"), [
     ("def obstacle(self, vehicle, two_tracks):\n        return vehicle.wings", ":19: AttributeError: 'Vehicle'"),
-    ("def obstacle(self, vehicle, two_tracks):\n        return True", "answer with words or None, found True"),
+    ("def obstacle(self, vehicle, two_tracks):\n        return True", "return words or None, found True"),
 ])
 def test_an_obstacle_that_is_none(tmp_path: Path, more: str, words: str) -> None:
     effect = own_effect(written(tmp_path, "SensorEffect", "return np.ones_like(s)", f"\n\n    {more}"))
@@ -116,10 +116,10 @@ def test_an_obstacle_that_is_none(tmp_path: Path, more: str, words: str) -> None
 
 
 @pytest.mark.parametrize(("does", "words"), [
-    ("return [{}['size']]", ":19: KeyError: 'size'"), ("return None", "expected trials to answer with a list"),
-    ("return []", "expected trials to answer with a list"), ("return [{}]", "mine: expected a value of size"),
+    ("return [{}['size']]", ":19: KeyError: 'size'"), ("return None", "expected trials to return a list"),
+    ("return []", "expected trials to return a list"), ("return [{}]", "mine: expected a value of size"),
     ("return [{'size': 99.0}]", "mine: expected size of 0 to 10, found 99"),
-    ("return [{'size': '2'}]", "expected trials to answer with a number as size, found '2'"),
+    ("return [{'size': '2'}]", "expected trials to return a number as size, found '2'"),
 ])
 def test_trials_that_are_none(tmp_path: Path, does: str, words: str) -> None:
     more = f"\n\n    def trials(self, seen=None):\n        {does}"

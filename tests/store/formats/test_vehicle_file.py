@@ -495,9 +495,9 @@ def test_complaints_about_the_history_name_the_line(tmp_path: Path, step: str, w
     ("(100.0,)", "(-100.0,)", ": drag_n_s2_per_m2: expected trials, choices and default within 0.0 to 5000.0"),
     ('Parameter("drag_n_s2_per_m2"', 'Parameter("file"', ": expected a parameter's name of letters"),
     ("parameters = (", "parameters = [] or (1,", ": expected parameters to be a tuple of Parameter"),
-    ("return laws.with", "laws.with", "expected laws to answer with a CornerLaws, found NoneType"),
-    ("p.drag_n_s2_per_m2 * rate_mps * abs(rate_mps)", "3.0", "expected a force to answer with an array of shape"),
-    ("rate_mps * abs(rate_mps)", "rate_mps / travel_m.min() * float('nan')", "a force to answer with finite numbers"),
+    ("return laws.with", "laws.with", "expected laws to return a CornerLaws, found NoneType"),
+    ("p.drag_n_s2_per_m2 * rate_mps * abs(rate_mps)", "3.0", "expected a force to return an array of shape"),
+    ("rate_mps * abs(rate_mps)", "rate_mps / travel_m.min() * float('nan')", "a force to return finite numbers"),
     ("p.drag_n_s2_per_m2 * rate_mps", "p.drag * rate_mps", ":15: AttributeError: 'types.SimpleNamespace' object has"),
 ])
 def test_complaints_about_an_effect_of_ones_own_name_its_file(

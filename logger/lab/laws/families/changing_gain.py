@@ -21,8 +21,8 @@ class ChangingGain(Family):
     def drafts(self, context: LawContext) -> list[Draft]:
         lasts_s = max(run.count / run.rate_hz for run in context.runs)
         change = Parameter("change_ratio", 0.1, -0.95, 5.0, 0.0, Scale.LINEAR, (0.1, -0.1),
-                           f"what is added to the gain over {lasts_s:g} s", step=0.01)
-        first = Parameter("gain_at_first_ratio", 1.0, 0.5, 2.0, None, Scale.LOG, (1.0,), "the gain as a run begins",
+                           f"change of the gain over {lasts_s:g} s", step=0.01)
+        first = Parameter("gain_at_first_ratio", 1.0, 0.5, 2.0, None, Scale.LOG, (1.0,), "gain at the start of a run",
                           default=1.0)
         method = _METHOD.format(lasts_s=lasts_s)
         return [self.draft((change,), method.replace("p.gain_at_first_ratio", "1.0"), variant="from_one"),
@@ -30,7 +30,7 @@ class ChangingGain(Family):
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         begins = f", from {say('gain_at_first_ratio')} on" if draft.variant == "from_any" else ""
-        return f"a gain that changes by {say('change_ratio')} in the course of the longest run{begins}"
+        return f"a gain that changes by {say('change_ratio')} over the longest run{begins}"
 
 
 FAMILY = ChangingGain()

@@ -46,9 +46,9 @@ def _draft(of: str, stiffness_n_per_m: float, lasts_s: float) -> Draft:
     size, lost, most = (rounded(share * stiffness_n_per_m) for share in (0.1, 0.9, 3.0))
     parameters = (
         Parameter("changed_n_per_m", size, -lost, most, 0.0, Scale.LINEAR, (size, -size),
-                  f"by which the stiffness of the {of} changes in the end", step=rounded(0.1 * size)),
+                  f"final change of the stiffness of the {of}", step=rounded(0.1 * size)),
         Parameter("time_s", times[1], rounded(0.01 * lasts_s), rounded(10 * lasts_s), None, Scale.LOG, times,
-                  "after which most of it is there"))
+                  "time constant of the change"))
     return FAMILY.draft(parameters, _METHOD.format(between=between), _FUNCTIONS.format(motion=motion), variant=of,
                         title=f"{of} whose stiffness changes as a run goes on",
                         signature=f"{what} faster, or slower, as a run goes on")

@@ -39,7 +39,7 @@ _DAMPERS = "dampers whose damping changes with the driving speed"
 
 class ChangingWithSpeed(Family):
     title = "a damping or a stiffness that changes with the driving speed"
-    signature = "runs at different speeds ask for different numbers of one car"
+    signature = "runs at different speeds need different parameters of one car"
     shown_by = "drive one road slowly and fast"
 
     def drafts(self, context: LawContext) -> list[Draft]:

@@ -39,9 +39,9 @@ _AT_LIMIT = (0.98, 0.8)  # of the greatest reading
 class Clipping(Family):
     title = "a record that is clipped"
     kind = "RecordEffect"
-    source = "data sheets of accelerometers give a range that they do not leave"
+    source = "data sheets of accelerometers give a range that readings cannot exceed"
     signature = "strong motions are cut off at one acceleration, up and down alike"
-    shown_by = "drive a rougher road: the strongest readings stay where they are"
+    shown_by = "drive a rougher road: the largest readings do not grow"
 
     def drafts(self, context: LawContext) -> list[Draft]:
         greatest = max(float(np.abs(run.kept_mps2).max()) for run in context.runs)
@@ -51,16 +51,16 @@ class Clipping(Family):
             return []
         limit = Parameter("limit_mps2", rounded(greatest, digits=4), rounded(0.1 * greatest), rounded(10 * greatest),
                           float("inf"), Scale.RECIPROCAL, tuple(rounded(one * greatest, digits=4) for one in _AT_LIMIT),
-                          "no reading is stronger")
+                          "the largest possible reading")
         sharpness = Parameter("sharpness_ratio", 2.0, 1.0, 20.0, None, Scale.LOG, (2.0,),
-                              "the higher, the later it bends")
+                              "the higher, the sharper the bend")
         return [self.draft((limit,), _METHOD, _CUT_OFF, variant="both"),
                 self.draft((limit, sharpness), _METHOD, _BENT, variant=_SMOOTHLY,
                            signature="the stronger a motion, the less of it is recorded, up and down alike")]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         if draft.variant == _SMOOTHLY:
-            return f"a record that bends towards {say('limit_mps2')}, with a sharpness of {say('sharpness_ratio')}"
+            return f"a record that saturates at {say('limit_mps2')}, with a sharpness of {say('sharpness_ratio')}"
         return f"a record that is cut off at {say('limit_mps2')}"
 
 

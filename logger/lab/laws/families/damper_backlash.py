@@ -43,7 +43,7 @@ class DamperBacklash(Family):
 
     def drafts(self, context: LawContext) -> list[Draft]:
         gap = Parameter("gap_m", 0.001, 0.0, 0.05, 0.0, Scale.LINEAR, (0.0003, 0.001, 0.003),
-                        "either way, within which the damper does not answer")
+                        "in each direction, within which the damper exerts no force")
         return [self.draft((gap,), _METHOD, _FUNCTIONS, at="loop")]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:

@@ -35,7 +35,7 @@ class DamperHeat(Family):
     related_effects = ("damper_blow_off",)
     source = ("O. Reynolds, Phil. Trans. Royal Society 177 (1886) 157: viscosity by temperature; J. C. Dixon, The "
               "Shock Absorber Handbook (2007), chapter 8: damping falls as the oil grows hot")
-    signature = "the damping falls while a rough road is driven"
+    signature = "the damping falls in the course of a rough road"
     shown_by = "drive a rough road for some minutes without a pause, and again after one"
 
     def drafts(self, context: LawContext) -> list[Draft]:
@@ -50,9 +50,9 @@ class DamperHeat(Family):
     def _draft(self, variant: str, losses: Mapping[str, str], trials: tuple[float, ...], lost: str) -> Draft:
         parameters = (
             *(Parameter(name, 1e-4, 0.0, 0.05, 0.0, Scale.LINEAR, trials,
-                        f"loss of the logarithm of {of} per energy that it takes up") for name, of in losses.items()),
+                        f"fall of the logarithm of {of} per absorbed energy") for name, of in losses.items()),
             Parameter("cooling_time_s", 30.0, 3.0, 600.0, None, Scale.LOG, (15.0, 100.0),
-                      "in which the loss falls to 37 %"))
+                      "time in which the loss falls to 37 %"))
         return self.draft(parameters, _METHOD.format(lost=lost), _FUNCTIONS, variant=variant)
 
     def narrower(self, draft: Draft, context: LawContext) -> list[Draft]:
@@ -61,8 +61,8 @@ class DamperHeat(Family):
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         where = {"lost_per_j": "", "front_lost_per_j": " (front)", "rear_lost_per_j": " (rear)"}
         grows = " and ".join(say(name, 1000.0, "") + axle for name, axle in where.items() if name in found.values)
-        return (f"dampers that fade as they grow hot, by exp(-h): h grows by {grows} for each kJ that one takes up, "
-                f"and falls back within {say('cooling_time_s')}")
+        return (f"dampers that fade as they grow hot, by exp(-h): h grows by {grows} for each absorbed kJ, and decays "
+                f"within {say('cooling_time_s')}")
 
 
 FAMILY = DamperHeat()

@@ -17,11 +17,11 @@ def force(p, seen):
 
 
 class ExtensionStop(Family):
-    title = "a stop in the suspensions' extension"
+    title = "a stop at the end of the suspension's travel in extension"
     related_effects = ("bump_stop", "progressive_spring")
     source = "K. H. Hunt and F. R. E. Crossley, J. Applied Mechanics 42 (1975) 440: contact with damping"
     signature = "large motions are cut short in extension"
-    shown_by = "drive over a crest or a wide hole so fast that the wheels hang"
+    shown_by = "drive over a crest or a wide hole fast enough for the wheels to hang"
 
     def drafts(self, context: LawContext) -> list[Draft]:
         stiffness = rounded(3.0 * context.vehicle.front.suspension_stiffness_n_per_m)
@@ -30,7 +30,8 @@ class ExtensionStop(Family):
             Parameter("stiffness_n_per_m", stiffness, 0.0, 100 * stiffness, 0.0, Scale.LINEAR, (stiffness,),
                       "of the stop"),
             Parameter("clearance_m", clear_m[len(clear_m) // 2], rounded(0.05 * clear_m[0]),
-                      context.reach("travel_m", 1.0), None, Scale.LOG, clear_m, "extension until it is met"),
+                      context.reach("travel_m", 1.0), None, Scale.LOG, clear_m, "extension from rest at which the "
+                                                                                "stop is met"),
             Parameter("damping_time_s", 0.01, 0.0, 1.0, None, Scale.LINEAR, (0.01,), "its damping over its stiffness",
                       step=0.001))
         return [self.draft(parameters, handed_on(), _FUNCTIONS, title="a stop in extension", at="loop")]

@@ -22,16 +22,16 @@ _METHOD = """def laws(self, p, laws):
 class FadingDamping(Family):
     title = "a damping that changes as a run goes on"
     source = "J. C. Dixon, The Shock Absorber Handbook, 2007, section 6.7"
-    signature = "the body and the wheels ring longer, or less long, as a run goes on"
+    signature = "the body and the wheels ring longer, or more briefly, as a run goes on"
     shown_by = "drive one rough road for half an hour from cold, recorded as one run"
 
     def drafts(self, context: LawContext) -> list[Draft]:
         lasts_s = max(run.count / run.rate_hz for run in context.runs)
         trials = tuple(rounded(share * lasts_s) for share in (0.1, 0.3, 1.0))
         lost = Parameter("lost_ratio", 0.2, -2.0, 0.95, 0.0, Scale.LINEAR, (0.2, -0.2), "share of the damping that is "
-                         "lost in the end", step=0.02)
+                         "finally lost", step=0.02)
         time = Parameter("time_s", trials[1], rounded(0.01 * lasts_s), rounded(10 * lasts_s), None, Scale.LOG, trials,
-                         "after which most of it is lost")
+                         "time constant of the loss")
         return [self.draft((lost, time), _METHOD, _FUNCTIONS, variant="settling")]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:

@@ -72,12 +72,12 @@ def _draft(context: LawContext, axle: str, runs: Sequence[str], radius_m: float,
                         for number, name in enumerate(names)) if last else f"p.{names[0]}"
     parameters = (
         Parameter("force_n", usual_n, -100 * usual_n, 100 * usual_n, 0.0, Scale.LINEAR, (usual_n,),
-                  "by which the tire's force falls at its middle", step=0.1 * usual_n),
-        Parameter("length_m", _LENGTH_M, 0.03, 0.8, None, Scale.LOG, (_LENGTH_M,), "of it, along the tread"),
+                  "fall of the tire's force at the middle of the spot", step=0.1 * usual_n),
+        Parameter("length_m", _LENGTH_M, 0.03, 0.8, None, Scale.LOG, (_LENGTH_M,), "of the spot, along the tread"),
         Parameter("turn_radius_m", radius_m, *_RADII_M, None, Scale.LOG, (radius_m,),
-                  "of a wheel that turns once for each", step=1e-5),
+                  "of a wheel that turns once per blow", step=1e-5),
         *(Parameter(name, place_m, -turn_m, turn_m, None, Scale.LINEAR, (place_m,),
-                    f"along the road, where it is on the ground{of_run(run)}", step=0.005)
+                    f"along the road, where the spot touches the ground{of_run(run)}", step=0.005)
           for name, place_m, run in zip(names, places_m, runs, strict=True)))
     draft = FAMILY.draft(parameters, handed_on("dip", "WHEEL_AND_GROUND"), _FUNCTIONS.format(place=places),
                          variant="spot" + EACH * (last > 0), words=("needs_road = True",))

@@ -15,8 +15,8 @@ class ForceByRate(CurveFamily):
     motion = RATE
     force = "damper force"
     answers, tried = "suspension_damping_n_s_per_m", 1.0
-    source = ("oil that is pressed through holes resists with the square of its speed, valves with less than its first "
-              "power (J. C. Dixon, The Shock Absorber Handbook, 2007, chapter 6)")
+    source = ("the resistance of orifices grows with the square of the oil's speed, that of valves less than in "
+              "proportion (J. C. Dixon, The Shock Absorber Handbook, 2007, chapter 6)")
     signature = "the damping changes as the road gets rougher"
     usual_share, reach_share = 0.95, 0.9995
     powers, power_ends = (0.4, 2.0, 3.0), (0.1, 5.0)

@@ -16,7 +16,7 @@ class ForceByTravel(CurveFamily):
     force = "spring force"
     answers = "suspension_stiffness_n_per_m"
     source = "J. Reimpell, H. Stoll, J. W. Betzler, The Automotive Chassis (2001), chapter 5: springs, stops"
-    signature = "large motions meet another spring than small ones"
+    signature = "the spring is different at large and at small travel"
     ends = ((0, "in deep compression"), (-1, "in extension"))
 
 

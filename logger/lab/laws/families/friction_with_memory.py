@@ -30,9 +30,9 @@ class FrictionWithMemory(Family):
             Parameter("yield_force_n", 100.0, 0.0, 20000.0, 0.0, Scale.LINEAR, (100.0,),
                       "at which each suspension slides"),
             Parameter("yield_travel_m", 0.002, 0.0002, 0.05, None, Scale.LOG, (0.0008, 0.003, 0.01),
-                      "over which it would come to that at its first stiffness"),
+                      "over which the force would grow to that at its initial stiffness"),
             Parameter("sharpness_ratio", 1.0, 1.0, 1.0, None, Scale.LINEAR, (1.0,),
-                      "exponent of the law: the higher, the sharper the yield", default=1.0))
+                      "exponent: the higher, the sharper the yield", default=1.0))
         return [self.draft(parameters, handed_on(states=1), _FUNCTIONS, title="friction that gives before it slides",
                            at="loop")]
 

@@ -49,17 +49,17 @@ class Hum(Family):
             if wanders:
                 numbers += [
                     Parameter("early_cos_s", tone.wander_cos_s, -20.0, 20.0, None, Scale.LINEAR, (tone.wander_cos_s,),
-                              "by how much it is early as a run begins", step=_STEP_S),
+                              "lead of the tone at the start of a run", step=_STEP_S),
                     Parameter("early_sin_s", tone.wander_sin_s, -20.0, 20.0, None, Scale.LINEAR, (tone.wander_sin_s,),
-                              "by how much it is early a quarter of a period later", step=_STEP_S),
-                    _shape("period_s", tone.period_s, "in which its frequency goes up and down", step=10 * _STEP)]
+                              "lead of the tone a quarter of a period later", step=_STEP_S),
+                    _shape("period_s", tone.period_s, "in which its frequency rises and falls", step=10 * _STEP)]
             cycles, variant = (_WANDERS, "wanders") if wanders else (_STEADY, "steady")
             drafts += self._drafts(context, numbers, cycles, variant,
-                                   "a tone that is there whatever the speed and the road")
+                                   "a tone that is present at every speed and on every road")
         per_m = spatial_frequency(context, (0.3, 5.0)) if context.is_driven else None
         if per_m is not None:
             drafts += self._drafts(context, [_shape("cycles_per_m", per_m, "cycles per metre of road", step=_STEP)],
-                                   _BY_WAY, "by_way", "a tone whose frequency goes with the speed",
+                                   _BY_WAY, "by_way", "a tone whose frequency grows in proportion to the speed",
                                    words=("needs_road = True",))
         return drafts
 
@@ -71,7 +71,7 @@ class Hum(Family):
         def draft(runs: Sequence[str], variant: str) -> Draft:
             strengths = [Parameter(in_run(part, run, "mps2"), 0.1 * size, -100.0, 100.0, 0.0, Scale.LINEAR,
                                    (0.1 * size,), f"{words} of the hum{of_run(run)}", step=0.02 * size)
-                         for run in runs for part, words in (("cos", "even part"), ("sin", "odd part"))]
+                         for run in runs for part, words in (("cos", "cosine part"), ("sin", "sine part"))]
             pairs = ", ".join(f"(p.{in_run('cos', run, 'mps2')}, p.{in_run('sin', run, 'mps2')})" for run in runs)
             pick = pairs if len(runs) == 1 else f"(\n        {pairs},\n    )[min(recording.run, {len(runs) - 1})]"
             return self.draft((*strengths, *numbers), _METHOD.format(cycles=cycles, pick=pick), signature=signature,
@@ -89,7 +89,7 @@ class Hum(Family):
         if draft.variant.startswith("wanders"):
             late_s = float(np.hypot(found.values["early_cos_s"], found.values["early_sin_s"]))
             share = 2 * np.pi * late_s / found.values["period_s"]
-            wanders = f", going up and down by {share:.0%} in {say('period_s')}"
+            wanders = f", rising and falling by {share:.0%} in {say('period_s')}"
         return (f"a hum of {size:.2g} m/s2 r.m.s. at {say('frequency_hz')}{wanders}{begins}, that the road does not "
                 "cause: an engine or a fan")
 

@@ -34,7 +34,7 @@ class HungMass(Family):
     related_effects = ("occupant", "body_bending", "payload", "cg_shift")
     kind = "BodyEffect"
     source = "J. P. Den Hartog, Mechanical Vibrations (1956), chapter 3: a mass on a spring on a mass"
-    signature = "around its own frequency what carries it moves less than the model says, and beside it more"
+    signature = "near its own frequency, the part that carries it moves less than the model says; beside it, more"
     shown_by = "drive with it and without it, or put a second sensor where it hangs"
 
     def drafts(self, context: LawContext) -> list[Draft]:

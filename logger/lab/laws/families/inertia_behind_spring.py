@@ -44,16 +44,16 @@ class InertiaBehindSpring(Family):
         # At 0.3 m/s the square takes as much as a damping ratio of 0.15 at 8 Hz.
         sprung = (
             Parameter("stiffness_n_per_m", stiffness, 0.0, 100 * stiffness, 0.0, Scale.LINEAR, (stiffness,),
-                      "of the spring, where the inertia behind it stands still"),
+                      "of the spring while the inertia behind it stands still"),
             Parameter("frequency_hz", 8.0, 1.0, 40.0, None, Scale.LOG, (4.0, 8.0, 16.0, 32.0),
                       "of the inertia on its spring"),
             # An inerter's bearings hardly damp it, a mount's channel does.
             Parameter("damping_ratio", 0.2, 0.0, 3.0, None, Scale.LINEAR, (0.05, 0.2), "of its motion", step=0.01),
             Parameter("square_per_m", 50.0, 0.0, 30000.0, None, Scale.LINEAR, (50.0,),
-                      "of what holds its motion back by the square of its speed, over its inertia", step=5.0))
+                      "quadratic drag on the inertia, over its mass", step=5.0))
         wheel_kg = rounded(0.5 * front.unsprung_mass_kg)
         inertance = Parameter("inertance_kg", wheel_kg, 0.0, 100 * wheel_kg, 0.0, Scale.LINEAR, (wheel_kg,),
-                              "the mass that a suspension's ends feel against each other")
+                              "inertance between the two ends of a suspension")
         return [self.draft((inertance,), _RIGID, kind="BodyEffect", variant="rigid",
                            title="inertia that moves with the suspensions' travel",
                            signature="the wheels hop at a lower frequency, and the body feels it"),
@@ -64,8 +64,8 @@ class InertiaBehindSpring(Family):
         if draft.variant == "rigid":
             return f"an inertia of {say('inertance_kg')} that moves with the suspensions' travel: an inerter"
         return (f"inertia behind a spring of {say('stiffness_n_per_m', 0.001, 'N/mm')}, {say('frequency_hz')} with a "
-                f"damping ratio of {say('damping_ratio')} and a loss by the square of its speed of "
-                f"{say('square_per_m')}: an inerter, or a mount filled with fluid")
+                f"damping ratio of {say('damping_ratio')} and a quadratic drag of {say('square_per_m')}: an inerter, "
+                "or a mount filled with fluid")
 
 
 FAMILY = InertiaBehindSpring()

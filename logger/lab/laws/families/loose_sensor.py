@@ -65,7 +65,7 @@ class LooseSensor(Family):
     related_effects = ("sensor_mount_resonance", "sensor_gain")
     kind = "RecordEffect"
     source = "B. Brogliato, Nonsmooth Mechanics (2016), chapter 1: unilateral contact, impact without a bounce"
-    signature = "downwards the record goes no farther than a limit, and blows upwards follow"
+    signature = "the record never falls below a limit, and upward blows follow"
     shown_by = "screw the sensor down, and drive the same road again"
 
     def drafts(self, context: LawContext) -> list[Draft]:

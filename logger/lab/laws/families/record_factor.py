@@ -31,17 +31,19 @@ class RecordFactor(Family):
     related_effects = ("sensor_bandwidth", "sensor_mount_resonance", "body_bending", "sensor_gain")
     kind = "SensorEffect"
     source = "a rational function of low order (L. Ljung, System Identification, 1999, section 4.2)"
-    signature = "the measurement is the model times one function of frequency, whatever the road"
-    shown_by = "shake the sensor, in its place, beside another one"
+    signature = "the measurement is the model times one function of frequency, on every road"
+    shown_by = "shake the sensor, in its place, together with a reference sensor"
 
     def drafts(self, context: LawContext) -> list[Draft]:
-        added = Parameter("added_ratio", 0.1, -10.0, 10.0, 0.0, Scale.LINEAR, (0.1, -0.1), "what is added at rest",
+        added = Parameter("added_ratio", 0.1, -10.0, 10.0, 0.0, Scale.LINEAR, (0.1, -0.1), "change of the gain at "
+                                                                                           "frequency 0",
                           step=0.01)
-        rate = Parameter("rate_ratio", 0.1, -10.0, 10.0, 0.0, Scale.LINEAR, (0.1,), "what is added by the rate",
+        rate = Parameter("rate_ratio", 0.1, -10.0, 10.0, 0.0, Scale.LINEAR, (0.1,), "change of the gain in proportion "
+                                                                                    "to the frequency",
                          step=0.01)
         frequency = Parameter("frequency_hz", 10.0, 0.5, 60.0, None, Scale.LOG, _HZ, "of the pole")
         damping = Parameter("damping_ratio", 0.2, 0.02, 2.0, None, Scale.LOG, (0.2,), "of the pair of poles")
-        rising = replace(added, meaning="what is added to quick motions")
+        rising = replace(added, meaning="change of the gain at high frequencies")
         return [self.draft((added, frequency), _POLE, variant="pole"),
                 self.draft((rising, frequency), _RISING, variant="rising"),
                 *(self.draft((added, rate, replace(frequency, start=one, trials=(one,)), damping), _PAIR,

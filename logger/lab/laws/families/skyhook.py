@@ -24,7 +24,7 @@ _TRIED, _MOST = (0.3, 1.0), 30.0  # of the damper's own damping
 
 
 class Skyhook(Family):
-    title = "dampers that resist how fast the body moves against the ground"
+    title = "dampers that resist the body's velocity against the ground (skyhook)"
     related_effects = ("damper_asymmetry", "damper_blow_off")
     source = "D. Karnopp, M. J. Crosby and R. A. Harwood, Journal of Engineering for Industry 96 (1974)"
     signature = "the body bounces less, and the wheels hop no less"
@@ -34,15 +34,15 @@ class Skyhook(Family):
         own = context.vehicle.front.suspension_damping_n_s_per_m
         tried, most = tuple(rounded(share * own) for share in _TRIED), rounded(_MOST * own)
         sky = Parameter("sky_n_s_per_m", tried[0], 0.0, most, 0.0, Scale.LINEAR, tried,
-                        "force by the speed of the body's end of the suspension")
+                        "force over the velocity of the body's end of the suspension")
         firmest = Parameter("firmest_n_s_per_m", tried[1], rounded(0.01 * own), most, None, Scale.LOG, tried,
-                            "force by the suspension's rate, at most")
+                            "largest force over the suspension's rate")
         return [self.draft(parameters, handed_on("hooked"), functions, title=f"{variant} {self.title}", variant=variant)
                 for variant, parameters, functions in ((ACTIVE, (sky,), _ACTIVE),
                                                        (SEMI_ACTIVE, (sky, firmest), _SEMI_ACTIVE))]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
-        said = f"{draft.variant} dampers that resist the body's own speed against the ground, {say('sky_n_s_per_m')}"
+        said = f"{draft.variant} dampers that resist the body's velocity against the ground, {say('sky_n_s_per_m')}"
         return said if draft.variant == ACTIVE else f"{said}, by at most {say('firmest_n_s_per_m')} of their rate"
 
 

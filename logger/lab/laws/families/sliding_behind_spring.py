@@ -29,12 +29,12 @@ def rates(p, seen):
 
 
 class SlidingBehindSpring(Family):
-    title = "what slides behind a spring in a part on its bench"
+    title = "sliding behind a spring, in a part on a bench"
     related_effects = ("hysteresis", "top_mount_compliance", "dry_friction")
     source = ("F. H. Norton, The Creep of Steel at High Temperatures (1929); P. Perzyna, Advances in Applied Mechanics "
               "9 (1966) 243")
     signature = "small motions meet a spring, larger ones a force that hardly grows"
-    shown_by = "move the part by little and by much, slowly and fast"
+    shown_by = "move the part by small and by large amounts, slowly and fast"
 
     def drafts(self, context: LawContext) -> list[Draft]:
         vehicle = context.vehicle
@@ -48,15 +48,15 @@ class SlidingBehindSpring(Family):
             Parameter("sliding_force_n", size_n, 0.0, 1e4 * size_n, 0.0, Scale.LINEAR, (size_n,),
                       f"as it slides at {rate_mps:g} m/s, shortening"),
             Parameter("yield_travel_m", lengths_m[0], 1e-4 * lengths_m[0], 10 * travel_m, None, Scale.LOG, lengths_m,
-                      "over which its spring comes to that force"),
+                      "over which the spring reaches that force"),
             Parameter("power_ratio", 1.5, 0.3, 40.0, None, Scale.LOG, (1.5, 6.0),
                       "exponent of the force in the rate of sliding"),
             Parameter("sliding_rate_m_per_s", rate_mps, rate_mps, rate_mps, None, Scale.LOG, (rate_mps,),
-                      "at which what slides has its force", default=rate_mps),
+                      "at which the sliding part has its force", default=rate_mps),
             Parameter("lengthening_ratio", 1.0, 0.1, 10.0, None, Scale.LOG, (1.0,),
                       "of the force of shortening to that of lengthening"),
             Parameter("play_m", 0.1 * travel_m, 0.0, travel_m, None, Scale.LINEAR, (0.1 * travel_m,),
-                      "either way, within which it has no force"))
+                      "in each direction, within which there is no force"))
         one_way = replace(ratio, low=1.0, high=1.0, default=1.0)
         tight = replace(play, start=0.0, high=0.0, trials=(0.0,), default=0.0)
         return [self.draft((force, over, power, rate, *more), handed_on(states=1), _FUNCTIONS, variant=variant,
@@ -67,8 +67,8 @@ class SlidingBehindSpring(Family):
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         more = {"by direction": f", {say('lengthening_ratio')} times that of lengthening",
                 "with play": f", with play of {say('play_m', 1000.0, 'mm')} either way"}.get(draft.variant, "")
-        return (f"what slides behind a spring, {say('sliding_force_n')} over {say('yield_travel_m', 1000.0, 'mm')} at "
-                f"the power {say('power_ratio')}{more}")
+        return (f"sliding behind a spring, {say('sliding_force_n')} over {say('yield_travel_m', 1000.0, 'mm')} at the "
+                f"power {say('power_ratio')}{more}")
 
 
 FAMILY = SlidingBehindSpring()

@@ -1,7 +1,7 @@
 """A profile from which short waves are missing: the instrument, or whoever wrote it, took means along the way.
 
 The wheels met the road itself. A mean leaves a share of each wave that depends on its length alone, so that the road is
-the profile with every wave over that share (ASTM E950 and EN 13036-6 have profilers take means over a base). What a
+the profile with every wave over that share (ASTM E950 and EN 13036-6 have profilers average over a base length). What a
 mean left nothing of is in no profile: no wave is raised more than a hundred times, as profiles are written to the
 micrometre, and their rounding would be a tenth of a millimetre beyond.
 """
@@ -41,22 +41,22 @@ class SmoothedProfile(Family):
     title = "a profile that lacks short waves"
     related_effects = ("tire_enveloping", "sensor_mount_resonance", "sensor_bandwidth")
     kind = "RoadEffect"
-    source = "profilers take means over a base (ASTM E950; EN 13036-6)"
-    signature = "the car is shaken more than by its profile, by short waves the more, at any speed alike"
-    shown_by = "drive one road slowly and fast: what is missing stays at one length of wave"
+    source = "profilers average over a base length (ASTM E950; EN 13036-6)"
+    signature = "the car shakes more than on its profile, most of all on short waves, at every speed"
+    shown_by = "drive one road slowly and fast: what is missing stays at one wavelength"
 
     def drafts(self, context: LawContext) -> list[Draft]:
         if not context.is_driven:
             return []
-        spread = _length("spread_m", 1.0, "standard deviation of the bell that smoothed it")
-        base = _length("base_m", 12**0.5, "base of the mean that smoothed it")
+        spread = _length("spread_m", 1.0, "standard deviation of the Gaussian that smoothed it")
+        base = _length("base_m", 12**0.5, "base length of the moving average that smoothed it")
         return [self.draft((one,), _METHOD, _FUNCTIONS.format(share=share), variant=variant)
                 for variant, one, share in (("bell", spread, _BELL), ("mean", base, _MEAN))]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         if draft.variant == "mean":
-            return f"a profile that was smoothed by a mean over {say('base_m')}"
-        return f"a profile that was smoothed by a bell with a standard deviation of {say('spread_m')}"
+            return f"a profile that was smoothed by a moving average over {say('base_m')}"
+        return f"a profile that was smoothed by a Gaussian with a standard deviation of {say('spread_m')}"
 
 
 def _length(name: str, times: float, meaning: str) -> Parameter:

@@ -28,7 +28,7 @@ class SpringWithMemory(Family):
         stiffness = rounded(0.5 * context.vehicle.front.suspension_stiffness_n_per_m)
         parameters = (
             Parameter("stiffness_n_per_m", stiffness, 0.0, 100 * stiffness, 0.0, Scale.LINEAR, (stiffness,),
-                      "of the rubber where it has no time to creep"),
+                      "of the rubber when it has no time to creep"),
             Parameter("creep_time_s", 0.1, 0.005, 5.0, None, Scale.LOG, (0.02, 0.07, 0.25),
                       "in which its force falls to 37 %"))
         return [self.draft(parameters, handed_on(states=1), _FUNCTIONS, at="loop",

@@ -12,12 +12,12 @@ from logger.lab.laws.curves import DEFLECTION, CurveFamily
 class TireForce(CurveFamily):
     title = "a force by the deflection of the tires"
     related_effects = ("bump_stop", "progressive_spring", "wheel_lift")
-    shown_by = "drive a rough road, or over obstacles, fast, so that the tires are pressed far"
+    shown_by = "drive a rough road, or over obstacles, fast, so that the tires deflect far"
     motion = DEFLECTION
     force = "tire force"
     answers = "tire_stiffness_n_per_m"
     source = "H. B. Pacejka, Tire and Vehicle Dynamics (2012), chapter 9: stiffness grows with the load"
-    signature = "wheels hop at another frequency where the road is rough"
+    signature = "wheels hop at a different frequency where the road is rough"
     ends = ((0, "where it is pressed most"), (-1, "where it is let go"))
 
 

@@ -33,8 +33,8 @@ _RADII_M = (0.1, 0.5)
 
 
 class WheelTurns(Family):
-    title = "a force that comes round with the wheels' turns"
-    source = "a mass that turns beside its axle (J. P. Den Hartog, Mechanical Vibrations, 1956, section 6.1)"
+    title = "a force that repeats with each turn of the wheels"
+    source = "a mass that turns off its axis (J. P. Den Hartog, Mechanical Vibrations, 1956, section 6.1)"
     signature = "it repeats along the road, whatever the speed, and grows with the square of the speed"
     shown_by = "drive a smooth road at two steady speeds"
     stands_out = True
@@ -59,7 +59,7 @@ class WheelTurns(Family):
             for axle in axles for run in runs
             for part, words in (("cos", "downward at distance 0"), ("sin", "a quarter turn later"))]
         radius = Parameter("turn_radius_m", radius_m, *_RADII_M, None, Scale.LOG, (radius_m,),
-                           "of a wheel that turns once for each of its pulls", step=1e-5)
+                           "of a wheel that turns once per period of the force", step=1e-5)
         functions = _FUNCTIONS.format(cos=_of_run("cos", runs), sin=_of_run("sin", runs))
         return self.draft((*strengths, radius), _METHOD.format(pick=_pick(axles, runs)), functions, variant=variant,
                           words=("needs_road = True",))
@@ -74,11 +74,11 @@ class WheelTurns(Family):
             sizes = " and ".join(f"{_size(found, axle):.2g} kg m{f' at the {axle}' * bool(axle)}" for axle in axles)
             parts = f"(mean of the runs) by {sizes}{BEGINS}"
         else:
-            parts = "(even and odd part) by " + " and ".join(
+            parts = "(cosine and sine part) by " + " and ".join(
                 f"{say(_name(axle, 'cos'))} and {say(_name(axle, 'sin'))}{f' at the {axle}' * bool(axle)}"
                 for axle in axles)
-        return (f"a force that comes round once in each {each_m:.2f} m of road, as a wheel of {radius} turns, and "
-                f"grows with the square of the speed: out of balance {parts}")
+        return (f"a force that repeats every {each_m:.2f} m of road, as a wheel of {radius} turns, and grows with the "
+                f"square of the speed: out of balance {parts}")
 
 
 def _name(axle: str, part: str, run: str = "") -> str:
