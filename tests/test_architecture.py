@@ -30,8 +30,8 @@ FLOORS = (
     "arrays", "errors", "bounds", "units", "geodesy", "records", "chart_data", "printable", "left_out", "fitting",
     "dsp", "comfort", "profiles", "runs", "vehicle", "roads", "estimation", "simulation", "identification", "modal",
     "lab", "extraction",
-    "files", "shipped", "plugins", "installation", "store", "exchange", "studies", "service", "report", "fleet", "demo",
-    "api", "commands",
+    "files", "shipped", "plugins", "installation", "store", "question", "exchange", "studies", "service", "report",
+    "fleet", "demo", "api", "commands",
 )
 """Folders and single modules of ``logger``, from the lowest floor up: imports run downwards only."""
 STORE = ("formats", "log", "export", "integrity")
@@ -41,7 +41,8 @@ NUMERICAL = FLOORS[: FLOORS.index("extraction") + 1]
 OUTSIDE = {"os", "sys", "io", "pathlib", "time", "socket", "logging", "subprocess", "threading", "yaml", "drivers"}
 CARRIED = {
     "arrays", "errors", "bounds", "units", "geodesy", "records", "printable", "dsp", "comfort", "profiles", "runs",
-    "vehicle", "roads", "estimation", "files", "shipped", "plugins", "installation", "store", "service", "commands",
+    "vehicle", "roads", "estimation", "files", "shipped", "plugins", "installation", "store", "question", "service",
+    "commands",
 }
 """Floors that a car carries; every other floor is the desk's."""
 ON_BOARD = [name for name in SOURCES if name.startswith("logger.service.")] + [

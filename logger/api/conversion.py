@@ -12,12 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from logger.api.log_questions import ConvertQuestion
-from logger.api.question import function
 from logger.api.shown import CommandResult, check_out
 from logger.errors import BadInput
 from logger.exchange.layer import Attribute, Feature, Kind, Layer, cut, format_of, windows_layer, write_layer
 from logger.left_out import counting, left_out_json, left_out_lines
 from logger.printable import counted
+from logger.question import function
 from logger.records import WindowRecord
 from logger.report.placed import column, damaged, iri_errors, placed, trace_of
 from logger.report.summary import counts

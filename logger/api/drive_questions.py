@@ -9,7 +9,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union
 
 from drivers.catalogue import names
-from logger.api.question import (
+from logger.api.shared_fields import (
+    Anyway,
+    Localized,
+    ResampleHz,
+    ResampleM,
+    Runs,
+    Unit,
+    Vehicle,
+    VehicleName,
+    files_of,
+)
+from logger.errors import BadInput
+from logger.question import (
     ADDED,
     AUTO,
     COMMON_SPEED_MPS,
@@ -26,28 +38,18 @@ from logger.api.question import (
     SPACING,
     SPEED,
     WINDOW,
-    Anyway,
     Argument,
     InPython,
-    Localized,
     LongQuestion,
     Option,
     Out,
     Question,
     Range,
-    ResampleHz,
-    ResampleM,
-    Runs,
-    Unit,
-    Vehicle,
-    VehicleName,
     Verb,
     check_word_or_number,
-    files_of,
     word_or_number,
 )
-from logger.api.question import IRI as IRI_RANGE
-from logger.errors import BadInput
+from logger.question import IRI as IRI_RANGE
 from logger.units import WINDOW_M
 
 if TYPE_CHECKING:

@@ -16,7 +16,6 @@ import numpy.typing as npt
 
 from logger import bounds
 from logger.api.drive_questions import EstimateQuestion
-from logger.api.question import Notify, function, silent
 from logger.api.roads import Profile, read_profile, write_profile
 from logger.api.shown import CommandResult, Shown, checks_json, checks_lines, table
 from logger.api.vehicles import model_of
@@ -38,6 +37,7 @@ from logger.estimation.sensor_noise import NOISE_MPS2, Sensor
 from logger.files import make_folder, together, write_text
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
+from logger.question import Notify, function, silent
 from logger.report.quantities import known
 from logger.runs import SKIP_S, UNKNOWN, begins_freely
 from logger.runs import Run as Record

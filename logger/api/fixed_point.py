@@ -13,8 +13,8 @@ from pathlib import Path
 from string import Template
 from typing import TYPE_CHECKING, Annotated, Any
 
-from logger.api.question import Option, Question, Verb
 from logger.files import make_folder, together, write_text
+from logger.question import Option, Question, Verb
 
 if TYPE_CHECKING:
     from logger.api.shown import CommandResult

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from logger.api.log_questions import IngestQuestion, ReportQuestion, SummariseQuestion, day_us
-from logger.api.question import function
 from logger.api.shown import CommandResult
 from logger.errors import BadInput
 from logger.files import note, read_bounded, replace_bytes
 from logger.fleet.dataset import EXTRA, Dataset, Engine, existing, opened
 from logger.fleet.road_map import RoadMap, RoadPieces, cell_keys, pieces_of
+from logger.question import function
 
 if TYPE_CHECKING:
     from logger.exchange.layer import Layer

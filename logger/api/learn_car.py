@@ -13,7 +13,7 @@ import numpy as np
 from logger.api.csv_extraction import CsvSettings, recorded_csv
 from logger.api.drive_questions import LearnCarQuestion
 from logger.api.extraction import even_drives, recorded_dump
-from logger.api.question import each, function
+from logger.api.shared_fields import each
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, read_vehicle
 from logger.chart_data import Chart, Curves, Line
@@ -39,6 +39,7 @@ from logger.identification.unknown_car import (
     reading_power,
 )
 from logger.printable import counted
+from logger.question import function
 from logger.runs import READING
 from logger.service.config import Config
 from logger.shipped import vehicle_names, vehicle_path

@@ -8,7 +8,8 @@ from re import fullmatch
 from typing import Annotated
 
 from drivers.catalogue import names
-from logger.api.question import LIMIT, Argument, Localized, Option, Out, Question, Range, Verb, Verbs, limit_of
+from logger.api.shared_fields import Localized, limit_of
+from logger.question import LIMIT, Argument, Option, Out, Question, Range, Verb, Verbs
 from logger.units import FOOT_M, LENGTH_UNITS_M
 
 LEAST_M, MOST_M = 25 * FOOT_M, 100_000.0

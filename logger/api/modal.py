@@ -17,7 +17,6 @@ import numpy.typing as npt
 
 from logger.api.drive_questions import ModesCommand, ModesQuestion
 from logger.api.drives import read_run
-from logger.api.question import COMMON_IRI, COMMON_SPEED_MPS, IRI, SPEED, function
 from logger.api.shown import CommandResult, Shown, table
 from logger.api.vehicles import Model, model_of
 from logger.arrays import Bools, Complex
@@ -30,6 +29,7 @@ from logger.modal.decay import decrement_mode
 from logger.modal.driven_car import car_modes
 from logger.modal.mode import FoundMode, ModalResult, pole_rows
 from logger.printable import counted
+from logger.question import COMMON_IRI, COMMON_SPEED_MPS, IRI, SPEED, function
 from logger.report.quantities import known
 from logger.runs import READING, SKIP_S
 from logger.store.formats import record_checks

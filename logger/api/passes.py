@@ -16,7 +16,6 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.api.log_questions import PassesQuestion, day_us, length_of
-from logger.api.question import function
 from logger.api.shown import CommandResult
 from logger.chart_data import Array, Chart, Curves, Line
 from logger.comfort.iso2631 import comfort_word
@@ -24,6 +23,7 @@ from logger.errors import BadInput
 from logger.exchange.layer import Attribute, Feature, Kind, Layer, cut, half_way, iri_title, write_layer
 from logger.left_out import left_out_json, left_out_paragraph
 from logger.printable import counted
+from logger.question import function
 from logger.records import WindowRecord
 from logger.report.document import EMPTY, Html, grid, hint, html, map_links, paragraphs, section
 from logger.report.page import number_button, page

@@ -12,7 +12,6 @@ import numpy as np
 from scipy.signal import welch
 
 from logger.api.drive_questions import ComfortQuestion
-from logger.api.question import function
 from logger.api.shown import CommandResult, Shown, checks_json, checks_lines, table
 from logger.chart_data import Array, Chart, Curves, Line, line
 from logger.comfort import iso2631
@@ -33,6 +32,7 @@ from logger.comfort.iso2631 import (
 from logger.dsp.weightings.weighting import Weighting
 from logger.errors import BadInput
 from logger.plugins import catalogue
+from logger.question import function
 from logger.report.quantities import known
 from logger.runs import UNKNOWN, RecordFacts
 from logger.store.formats import drive_file, record_file

@@ -10,10 +10,10 @@ from typing import Any, ClassVar
 import numpy as np
 
 from logger.api.drive_questions import ClassifyQuestion, IriQuestion, RandomRoadQuestion
-from logger.api.question import function
 from logger.api.shown import CommandResult, Shown, table
 from logger.chart_data import Array, Chart, Curves, Line, line
 from logger.errors import BadInput
+from logger.question import function
 from logger.report.quantities import area_lines, area_values, measured
 from logger.report.summary import IRI_CLASSES
 from logger.roads import elevation_spectrum, iso8608

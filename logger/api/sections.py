@@ -15,7 +15,6 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.api.log_questions import SectionsQuestion, length_of
-from logger.api.question import function
 from logger.api.shown import CommandResult
 from logger.chart_data import Array, Chart, Curves, Line
 from logger.comfort.iso2631 import comfort_word
@@ -23,6 +22,7 @@ from logger.errors import BadInput
 from logger.exchange import layer
 from logger.left_out import left_out_json, left_out_paragraph
 from logger.printable import counted
+from logger.question import function
 from logger.records import WindowRecord
 from logger.report.placed import column, iri_errors, of_sections, placed, trace_of
 from logger.report.quantities import UNITS, DisplayUnits, area_lines, area_values, known

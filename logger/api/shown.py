@@ -8,16 +8,16 @@ What was found and done about a record before it was used, for a person and for 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterable, Mapping, Sequence
-from copy import deepcopy
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterable, Sequence
+from dataclasses import asdict, dataclass
 from math import isfinite
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from logger.errors import EXIT_DONE, BadInput
+from logger.errors import BadInput
 from logger.files import why_not_written, write_text
 from logger.left_out import left_out_json, left_out_lines
+from logger.question import Answer
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
@@ -52,29 +52,11 @@ class Shown(ABC):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CommandResult(Shown):
-    """What a command says.
-
-    text    the lines that it prints
-    """
-
-    text: str
-    _json: dict[str, Any] = field(repr=False)
-
-    def __repr__(self) -> str:
-        return self.text
+class CommandResult(Answer, Shown):
+    """An answer with charts and a page."""
 
     title: ClassVar[str] = ""
     """Of its page."""
-
-    @property
-    def exit_status(self) -> int:
-        """That its command leaves with."""
-        return EXIT_DONE
-
-    def as_json(self) -> dict[str, Any]:
-        """The object that the command prints with ``--json``; a copy."""
-        return deepcopy(self._json)
 
     def as_page(self, of: str) -> Html:
         """It as a page that stands alone; ``of``: what it is a result of, such as a file."""
@@ -82,18 +64,10 @@ class CommandResult(Shown):
 
         return page(self.title, of, self.text, self.charts())
 
-    def remarks(self, written: Mapping[str, Sequence[Path]]) -> Sequence[str]:
-        """What its command says on stderr, a line each; ``written``: the files of the command, by option."""
-        return ()
-
     def write(self, path: Path, option: str = "--out") -> None:
         """Write it as the file that an ``option`` of its command asks for: of its own kind where it has one, else its
         page."""
         write_text(path, self.as_page(""))
-
-    def next_words(self, question: Any, written: Mapping[str, Sequence[Path]]) -> str:
-        """What its command says last, such as what to do next; ``written``: the files of the command, by option."""
-        return ""
 
 
 def table(title: str, rows: Iterable[Row]) -> str:

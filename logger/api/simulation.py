@@ -12,14 +12,15 @@ import numpy.typing as npt
 
 from logger.api.drive_questions import SimulateCommand, SimulateQuestion
 from logger.api.drives import Run
-from logger.api.question import function, named_numbers
 from logger.api.roads import Profile, read_profile
+from logger.api.shared_fields import named_numbers
 from logger.api.shown import CommandResult
 from logger.api.vehicles import car_on, check_forces, model_of
 from logger.chart_data import Array, Chart
 from logger.errors import BadInput
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
+from logger.question import function
 from logger.report.quantities import numbers_of
 from logger.roads.iri import doubt_of
 from logger.shipped import vehicle_path

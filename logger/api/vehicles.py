@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 
 from logger.api.drive_questions import CalibrateQuestion
-from logger.api.question import function
 from logger.api.shown import CommandResult, Shown, table
 from logger.chart_data import Array, Chart, Curves, Line
 from logger.comfort.iso2631 import COMFORT_WORDS
@@ -21,6 +20,7 @@ from logger.estimation.rms_calibration import LEVELS_IRI, CalibrationSettings, R
 from logger.files import write_text
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
+from logger.question import function
 from logger.report.quantities import numbers_of, unit_of
 from logger.runs import moves_part
 from logger.service.signal_chain import recorder_gain

@@ -1,26 +1,19 @@
-"""Record the raw bytes of a serial port, with the time of their arrival, as a dump.
+"""``ridelog capture``: a recording of what a serial port sends, and a first look at it."""
 
-  ridelog capture /dev/ttyUSB0 --out sensor.dump.gz
-  ridelog capture /dev/ttyACM0 --baud 9600 --seconds 60 --out receiver.dump.gz
-
-For an instrument whose frames nobody knows yet: what comes is kept byte by byte, and the first look that is printed
-at the end shows what kind of frames it may be. End it with Ctrl-C.
-"""
-
-from __future__ import annotations
-
-import argparse
 import sys
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
 
 from drivers.accelerometers import line_reader
 from drivers.dump import DumpHeader, DumpWriter, Event
 from drivers.hardware import BytePort, open_serial, port_advice
-from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
+from logger.errors import BadInput
+from logger.question import Argument, Checked, Option, Question, Verb, more_than_0
 from logger.service.main_loop import monotonic_us as now_us
 from logger.service.systemd_notify import stopped_by_signals
 from logger.units import US_PER_S
@@ -32,40 +25,54 @@ _SHOWN_BYTES = 64
 _LONGEST_FRAME = 128
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``ridelog capture``."""
-    parser.add_argument("port", metavar="PORT", help="serial port, such as /dev/ttyUSB0")
-    parser.add_argument("--baud", type=int, default=115200, metavar="N", help="bits per second (default: 115200)")
-    parser.add_argument("--seconds", type=float, metavar="N", help="end after this time (default: at Ctrl-C)")
-    parser.add_argument("--out", type=Path, required=True, metavar="FILE.dump[.gz]", help="dump to write; must be new")
+def _name_of_a_dump(out: Path) -> None:
+    if not out.name.endswith((".dump", ".dump.gz")):
+        raise ValueError("expected a name that ends in .dump or .dump.gz")
 
 
-def run(args: argparse.Namespace) -> int:
-    """Carry out ``ridelog capture``."""
-    if not args.out.name.endswith((".dump", ".dump.gz")):
-        raise BadInput(f"{args.out}: expected a name that ends in .dump or .dump.gz")
-    if args.seconds is not None and not args.seconds > 0:
-        raise BadInput(f"--seconds {args.seconds:g}: expected more than 0")
-    port = open_serial(args.port, args.baud)
+@dataclass(frozen=True, kw_only=True)
+class CaptureQuestion(Question):
+    """Record the raw bytes of a serial port, with the time of their arrival, as a dump.
+
+      ridelog capture /dev/ttyUSB0 --out sensor.dump.gz
+      ridelog capture /dev/ttyACM0 --baud 9600 --seconds 60 --out receiver.dump.gz
+
+    For an instrument whose frames nobody knows yet: what comes is kept byte by byte, and the first look that is printed
+    at the end shows what kind of frames it may be. End it with Ctrl-C.
+    """
+
+    port: Annotated[str, Argument("serial port, such as /dev/ttyUSB0", metavar="PORT")]
+    baud: Annotated[int, Option("bits per second", metavar="N")] = 115200
+    seconds: Annotated[float | None, Option("end after this time (default: at Ctrl-C)", metavar="N",
+                                            check=more_than_0)] = None
+    out: Annotated[Path, Option("dump to write; must be new", metavar="FILE.dump[.gz]", read=Path,
+                                check=_name_of_a_dump)]
+
+
+VERB = Verb(CaptureQuestion, "logger.commands.capture:captured", has_json=False)
+
+
+def captured(asked: CaptureQuestion) -> Checked:
+    """Record until it is told to stop; the first look at what came."""
+    port = open_serial(asked.port, asked.baud)
     try:
-        header = DumpHeader(None, {"driver": line_reader().name, "port": args.port, "baud": args.baud}, {}, "unknown")
-        writer = _new_dump(args.out, header)
-        print(f"recording {args.port} at {args.baud} baud to {args.out}; Ctrl-C ends it", file=sys.stderr)
+        header = DumpHeader(None, {"driver": line_reader().name, "port": asked.port, "baud": asked.baud}, {}, "unknown")
+        writer = _new_dump(asked.out, header)
+        print(f"recording {asked.port} at {asked.baud} baud to {asked.out}; Ctrl-C ends it", file=sys.stderr)
         try:
             with stopped_by_signals() as stop:
-                look, total, duration_s, fault = _record(port, writer, args.seconds, stop.is_set, now_us)
+                look, total, duration_s, fault = _record(port, writer, asked.seconds, stop.is_set, now_us)
         finally:
             writer.close()
     finally:
         port.close()
     print("\r", end="", file=sys.stderr, flush=True)
-    print(f"{total} bytes in {duration_s:.1f} s, {total / max(duration_s, 1e-6):.0f} bytes/s, in {args.out}")
-    print("\n".join(first_look(look)))
-    if not total and (advice := port_advice(args.port)):
-        print(f"{advice}.")
+    advice = "" if total else port_advice(asked.port)
     if fault is not None:
         print(f"ridelog: {fault}; what came before is kept", file=sys.stderr)
-    return EXIT_DONE if total and fault is None else EXIT_CHECK_FAILED
+    lines = [f"{total} bytes in {duration_s:.1f} s, {total / max(duration_s, 1e-6):.0f} bytes/s, in {asked.out}",
+             *first_look(look), *([f"{advice}."] if advice else [])]
+    return Checked("\n".join(lines), {}, bool(total) and fault is None)
 
 
 def first_look(data: bytes) -> list[str]:

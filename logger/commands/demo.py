@@ -25,7 +25,7 @@ from zipfile import ZipFile
 from logger.api.lab.question import CompareQuestion
 from logger.commands.lab import say, take, walk
 from logger.commands.options import on_screen, progress, warned, wipe
-from logger.commands.replay import replay
+from logger.commands.replay import ReplayQuestion, replayed
 from logger.demo import BEYOND, CAR, DRIVES, FIELD, FOURTH, LAB, LINE, TrueCar
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import make_folder, together, write_file, write_text
@@ -75,13 +75,14 @@ def _drive(out: Path, as_json: bool) -> None:
     dump = out / DUMP_NAME
     make_folder(out)
     write_file(dump, [(resources.files("logger.demo") / DUMP_NAME).read_bytes()])
-    outcome = replay(dump, out, None, rate=0.0, vehicle=None, quiet=as_json)
+    with progress() as notify:
+        outcome = replayed(ReplayQuestion(dump=dump, out=out, progress=notify))
     report = out / REPORT_NAME
     write_report([(log, None) for log in outcome.files], report)
     if as_json:
         print(json.dumps(outcome.as_json() | {"report": str(report), "dump": str(dump)}))
     else:
-        print(outcome.text())
+        print(outcome.text)
         print(f"Recording: {dump} (ridelog replay and ridelog extract read it)")
         print(f"Report: {report} (open it in a browser; it needs no network)")
 

@@ -1,27 +1,17 @@
-"""Copy finished logs to a USB stick: checked, atomic, repeatable.
+"""``ridelog export``: finished logs to a USB stick, and the note that ``ridelog status`` shows of it."""
 
-  sudo ridelog export --to /media/RIDELOG
-  sudo ridelog export --to /media/RIDELOG --dumps
-
-Everything goes into ridelog/<this logger> on the stick, with a manifest that 'ridelog verify' checks. What is there
-already is read and left alone. If the settings pair the logger with sticks, only a copy to a paired one counts as an
-export. Exit status 0: all finished logs are there and marked; 1: not so, and why; 2: wrong use.
-"""
-
-from __future__ import annotations
-
-import argparse
-import json
 import re
 import sys
 from collections import Counter
 from contextlib import suppress
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Annotated
 
-from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput, RidelogError
+from logger.errors import BadInput, RidelogError
 from logger.files import read_bounded
 from logger.printable import counted, printable
+from logger.question import Checked, Hidden, Option, Question, Verb
 from logger.service.config import Config, find_config, load_config, load_pairing
 from logger.store.export import sticks
 from logger.store.export.export import ExportResult, Progress, export
@@ -31,53 +21,64 @@ from logger.store.log.atomic_file import is_taken
 _PULL = "it may be pulled"
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``ridelog export``."""
-    phase = parser.add_mutually_exclusive_group(required=True)
-    phase.add_argument("--to", metavar="DIR", type=Path, help="the stick, or any other folder")
-    parser.add_argument("--from", dest="logs", metavar="LOGDIR", type=Path, help="logs (default: the service's)")
-    parser.add_argument("--dumps", action="store_true", help="also the recorded dumps")
-    parser.add_argument("--config", metavar="FILE", type=Path, help="settings of the service")
-    parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
-    # What follows is typed by nobody: systemd/ridelog-export@.service passes it. --unmounted: say in the note that this
-    # stick may be pulled; --removed: it was, and ridelog status no longer shows it; --mounted: only if DIR is a mount
-    # point; --note: the file of the note; --led: the light that shows the notes, /sys/class/leds/NAME.
-    phase.add_argument("--unmounted", type=Path, help=argparse.SUPPRESS)
-    phase.add_argument("--removed", action="store_true", help=argparse.SUPPRESS)
-    parser.add_argument("--mounted", action="store_true", help=argparse.SUPPRESS)
-    parser.add_argument("--note", type=Path, help=argparse.SUPPRESS)
-    parser.add_argument("--led", type=Path, help=argparse.SUPPRESS)
+@dataclass(frozen=True, kw_only=True)
+class ExportQuestion(Question):
+    """Copy finished logs to a USB stick: checked, atomic, repeatable.
+
+      sudo ridelog export --to /media/RIDELOG
+      sudo ridelog export --to /media/RIDELOG --dumps
+
+    Everything goes into ridelog/<this logger> on the stick, with a manifest that 'ridelog verify' checks. What is there
+    already is read and left alone. If the settings pair the logger with sticks, only a copy to a paired one counts as
+    an export. Exit status 0: all finished logs are there and marked; 1: not so, and why; 2: wrong use.
+    """
+
+    to: Annotated[Path | None, Option("the stick, or any other folder", metavar="DIR", read=Path)] = None
+    logs: Annotated[Path | None, Option("logs (default: the service's)", metavar="LOGDIR", read=Path,
+                                        flag="--from")] = None
+    dumps: Annotated[bool, Option("also the recorded dumps")] = False
+    config: Annotated[Path | None, Option("settings of the service", metavar="FILE", read=Path)] = None
+    # What follows is typed by nobody: systemd/ridelog-export@.service passes it.
+    unmounted: Annotated[Path | None, Hidden("say in the note that the stick that was mounted here may be pulled",
+                                             read=Path)] = None
+    removed: Annotated[bool, Hidden("the stick was pulled, and ridelog status no longer shows it")] = False
+    mounted: Annotated[bool, Hidden("copy only if DIR is a mount point")] = False
+    note: Annotated[Path | None, Hidden("the file of the note", read=Path)] = None
+    led: Annotated[Path | None, Hidden("the light that shows the notes, /sys/class/leds/NAME", read=Path)] = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if (self.to is not None) + (self.unmounted is not None) + self.removed != 1:
+            raise self.complaint("export: expected `to` DIR")
 
 
-def run(args: argparse.Namespace) -> int:
-    """Carry out ``ridelog export``."""
-    board = _Board(args.note, args.led)
-    if args.removed:
-        return board.removed()
-    if args.unmounted is not None:
-        return board.unmounted(args.unmounted)
-    if args.mounted and not args.to.is_mount():
-        reason = f"{args.to}: no stick could be mounted there; expected one with FAT or exFAT"
+VERB = Verb(ExportQuestion, "logger.commands.export:exported")
+
+
+def exported(asked: ExportQuestion) -> Checked:
+    """Copy what is asked for, with the note of the stick kept; or only say in the note what became of it."""
+    board = _Board(asked.note, asked.led)
+    if asked.removed or asked.unmounted is not None:
+        return Checked("", {}, board.unmounted(asked.unmounted) if asked.unmounted is not None else board.removed())
+    assert asked.to is not None
+    if asked.mounted and not asked.to.is_mount():
+        reason = f"{asked.to}: no stick could be mounted there; expected one with FAT or exFAT"
         board.report("unmounting", False, reason)
-        print(printable(reason))
-        return EXIT_CHECK_FAILED
+        return Checked(printable(reason), {"to": str(asked.to), "complete": False}, False)
     board.report("copying", True, "copying")
     try:
-        config = _settings(args.config, args.logs)
-        logs = args.logs if args.logs is not None else config.log.directory
-        if args.logs is None and args.to.is_dir() and not logs.is_dir():
+        config = _settings(asked.config, asked.logs)
+        logs = asked.logs if asked.logs is not None else config.log.directory
+        if asked.logs is None and asked.to.is_dir() and not logs.is_dir():
             raise BadInput(f"{logs}: expected a folder with the logs; --from LOGDIR names another")
-        result = export(logs, args.to, args.dumps, board.progress, config.pairing, by_hand=not args.mounted)
+        result = export(logs, asked.to, asked.dumps, board.progress, config.pairing, by_hand=not asked.mounted)
     except RidelogError as error:
         board.report("unmounting", False, str(error))
         raise
     is_well = result.complete and result.unmarked is None
     board.report("unmounting", is_well, summary(result))
-    if args.json:
-        print(json.dumps({"to": str(args.to), "complete": result.complete, **asdict(result)}))
-    else:
-        print("\n".join(map(printable, screen(result))))
-    return EXIT_DONE if is_well else EXIT_CHECK_FAILED
+    return Checked("\n".join(map(printable, screen(result))),
+                   {"to": str(asked.to), "complete": result.complete, **asdict(result)}, is_well)
 
 
 def _settings(place: Path | None, logs: Path | None) -> Config:
@@ -164,24 +165,25 @@ class _Board:
     def progress(self, progress: Progress) -> None:
         self.report("copying", True, f"copying, {progress.done} of {progress.total} files")
 
-    def unmounted(self, place: Path) -> int:
-        """After the unmounting: only now may the stick be pulled."""
+    def unmounted(self, place: Path) -> bool:
+        """After the unmounting: only now may the stick be pulled. Whether it may."""
         before = sticks.read_note(self._note) if self._note is not None else None
         if place.is_mount():
             self.report("unmounting", False, f"{place} is still mounted; shut down before pulling it")
-            return EXIT_CHECK_FAILED
+            return False
         if before is None or before.state in ("waiting", "copying"):
             self.report("ready", False, f"copying did not end as it should; {_PULL}")
         else:
             self.report("ready", before.ok, f"{before.text}; {_PULL}")
-        return EXIT_DONE
+        return True
 
-    def removed(self) -> int:
+    def removed(self) -> bool:
+        """After it was pulled."""
         if self._note is not None:
             with suppress(OSError):
                 self._note.unlink(missing_ok=True)
             self._show()
-        return EXIT_DONE
+        return True
 
     def _show(self) -> None:
         if self._led is not None and self._note is not None:

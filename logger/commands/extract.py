@@ -1,151 +1,142 @@
-"""Make runs for the lab out of what the box in the car recorded, or a phone.
+"""``ridelog extract``: runs for the lab out of recordings."""
 
-Each continuous drive of a dump becomes a folder DIR/NAME, DIR/NAME-2, ... with drive.csv and run.yaml. With --profile,
-a measured line with lat_deg,lon_deg, a run holds only what was driven on that line, by the line's own distance: first
-from the GPS positions, then from the road as the car felt it. profile.csv then lies beside drive.csv.
-
-  ridelog extract drive.dump.gz --out runs --profile line.csv
-  ridelog diagnose --vehicle mycar.yaml runs/*
-
-With --csv, recordings of phones and other loggers: a CSV file, or the folder of one recording with several. Exports of
-phyphox, Sensor Logger, SensorLog, AndroSensor and Physics Toolbox are recognised; name the columns of others. The phone
-may lie at any angle: gravity shows which way is up. Uneven and repeated samples are repaired.
-
-  ridelog extract --csv phyphox-export/ --out runs
-  ridelog extract --csv ride.csv --location gps.csv --out runs
-  ridelog extract --csv log.csv --out runs --columns "t=time:ms,x=ax:g,y=ay:g,z=az:g,lat=lat,lon=lon,speed=v:km/h"
-
-Exit status 1: one of several recordings could not be used; it is named, and the others are done.
-"""
-
-from __future__ import annotations
-
-import argparse
-import json
 import sys
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Annotated
 
-from logger.api.question import Range
-from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
+from logger.errors import BadInput
 from logger.left_out import left_out_json, left_out_lines
 from logger.printable import printable
+from logger.question import Argument, Checked, LongQuestion, Option, Range, Several, Verb
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     from logger.api.extraction import Extracted
 
-CSV_OPTIONS = ("columns", "location", "up", "sign", "range", "speed")
+CSV_OPTIONS = ("columns", "location", "up", "sign", "range_g", "speed_mps")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``ridelog extract``."""
-    parser.add_argument("dumps", nargs="*", type=Path, metavar="DUMP", help="recorded drive (.dump or .dump.gz)")
-    parser.add_argument("--out", type=Path, required=True, metavar="DIR", help="folder for the runs")
-    parser.add_argument("--config", type=Path, metavar="FILE", help="settings of those drives")
-    parser.add_argument("--profile", type=Path, metavar="PROFILE.csv",
-                        help="profile of the road that was driven: distance_m,elevation_m[,elevation_right_m],lat_deg,"
-                             "lon_deg; places may be empty in most rows")
-    parser.add_argument("--vehicle", metavar="NAME|FILE",
-                        help="the car whose model recognises the road (default: the one that the settings or the "
-                             "recording name)")
-    parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
-    group = parser.add_argument_group("recordings of phones and other loggers")
-    group.add_argument("--csv", nargs="+", type=Path, default=[], metavar="FILE|FOLDER",
-                       help="recordings, in place of DUMP; a folder holds the files of one recording")
-    group.add_argument("--location", type=Path, metavar="FILE.csv",
-                       help="the file with the speed or place of the recording, on the same clock")
-    group.add_argument("--columns", metavar="ROLE=COLUMN[:UNIT],...",
-                       help="which columns are what: t (s, ms, us, ns, iso), x y z or up, the acceleration (m/s2, g, "
-                            "mg), gx gy gz, gravity, lat, lon, speed (m/s, km/h, mph, kn). Without a unit: the one at "
-                            "the end of the column's name, or what gravity and the clock show")
-    group.add_argument("--up", choices=("x", "y", "z", "-x", "-y", "-z"),
-                       help="for a record without gravity: the axis that points up (write --up=-z)")
-    group.add_argument("--sign", choices=("+", "-"),
-                       help="-: change the sign of the acceleration, for a program that gives gravity the opposite "
-                            "sign (write --sign=-)")
-    group.add_argument("--range", type=float, metavar="G",
-                       help="range of the sensor: readings at its ends are marked as clipped (default: ridelog "
-                            "recognises the range)")
-    group.add_argument("--speed", type=float, metavar="MPS", help="the constant speed of a recording that has none")
+@dataclass(frozen=True, kw_only=True)
+class ExtractQuestion(LongQuestion):
+    """Make runs for the lab out of what the box in the car recorded, or a phone.
+
+    Each continuous drive of a dump becomes a folder DIR/NAME, DIR/NAME-2, ... with drive.csv and run.yaml. With
+    --profile, a measured line with lat_deg,lon_deg, a run holds only what was driven on that line, by the line's own
+    distance: first from the GPS positions, then from the road as the car felt it. profile.csv then lies beside
+    drive.csv.
+
+      ridelog extract drive.dump.gz --out runs --profile line.csv
+      ridelog diagnose --vehicle mycar.yaml runs/*
+
+    With --csv, recordings of phones and other loggers: a CSV file, or the folder of one recording with several. Exports
+    of phyphox, Sensor Logger, SensorLog, AndroSensor and Physics Toolbox are recognised; name the columns of others.
+    The phone may lie at any angle: gravity shows which way is up. Uneven and repeated samples are repaired.
+
+      ridelog extract --csv phyphox-export/ --out runs
+      ridelog extract --csv ride.csv --location gps.csv --out runs
+      ridelog extract --csv log.csv --out runs --columns "t=time:ms,x=ax:g,y=ay:g,z=az:g,lat=lat,lon=lon,speed=v:km/h"
+
+    Exit status 1: one of several recordings could not be used; it is named, and the others are done.
+    """
+
+    dumps: Annotated[list[Path] | tuple[Path, ...], Argument("recorded drive (.dump or .dump.gz)", metavar="DUMP",
+                                                             read=Path, many=list)] = ()
+    out: Annotated[Path, Option("folder for the runs", metavar="DIR", read=Path)]
+    config: Annotated[Path | None, Option("settings of those drives", metavar="FILE", read=Path)] = None
+    profile: Annotated[Path | None, Option(
+        "profile of the road that was driven: distance_m,elevation_m[,elevation_right_m],lat_deg,lon_deg; places may "
+        "be empty in most rows", metavar="PROFILE.csv", read=Path)] = None
+    vehicle: Annotated[str | None, Option(
+        "the car whose model recognises the road (default: the one that the settings or the recording name)",
+        metavar="NAME|FILE")] = None
+    csv: Annotated[list[Path] | tuple[Path, ...], Several(
+        "recordings of phones and other loggers, in place of DUMP; a folder holds the files of one recording",
+        metavar="FILE|FOLDER", read=Path, many=list)] = ()
+    location: Annotated[Path | None, Option(
+        "with --csv: the file with the speed or place of the recording, on the same clock", metavar="FILE.csv",
+        read=Path)] = None
+    columns: Annotated[str | None, Option(
+        "with --csv: which columns are what: t (s, ms, us, ns, iso), x y z or up, the acceleration (m/s2, g, mg), gx "
+        "gy gz, gravity, lat, lon, speed (m/s, km/h, mph, kn). Without a unit: the one at the end of the column's "
+        "name, or what gravity and the clock show", metavar="ROLE=COLUMN[:UNIT],...")] = None
+    up: Annotated[str | None, Option(
+        "with --csv: for a record without gravity, the axis that points up (write --up=-z)",
+        choices=("x", "y", "z", "-x", "-y", "-z"))] = None
+    sign: Annotated[str | None, Option(
+        "with --csv, -: change the sign of the acceleration, for a program that gives gravity the opposite sign (write "
+        "--sign=-)", choices=("+", "-"))] = None
+    range_g: Annotated[float | None, Option(
+        "with --csv: range of the sensor, at whose ends readings are marked as clipped (default: ridelog recognises "
+        "it)", Range(0.5, 1000, "g"), "G", flag="--range")] = None
+    speed_mps: Annotated[float | None, Option(
+        "with --csv: the constant speed of a recording that has none", Range(0.5, 100, "m/s"), "MPS")] = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.csv and self.dumps:
+            raise self.complaint(f"extract: expected dumps or `csv`, found both ({self.dumps[0]})")
+        if not (self.csv or self.dumps):
+            raise self.complaint("extract: expected a DUMP, or `csv` with a recording of a phone or another logger")
+        if not self.csv and (given := next((one for one in CSV_OPTIONS if getattr(self, one) is not None), None)):
+            raise self.complaint(f"extract: expected `{given}` together with `csv`")
+        if self.location is not None and len(self.csv) > 1:
+            raise self.complaint(f"extract: expected one recording with `location`, found {len(self.csv)}")
 
 
-def run(args: argparse.Namespace) -> int:
-    """Carry out ``ridelog extract``."""
+VERB = Verb(ExtractQuestion, "logger.commands.extract:extracted")
+
+
+def extracted(asked: ExtractQuestion) -> Checked:
+    """Make the runs. BadInput where not one recording can be used."""
     from drivers.errors import DriverError
     from logger.commands.options import wipe
 
-    for option, within in (("range", Range(0.5, 1000, "g")), ("speed", Range(0.5, 100, "m/s"))):
-        if (value := getattr(args, option)) is not None:
-            within.check(f"--{option}", value)
-    extract_one = _of_csv(args) if args.csv else _of_dumps(args)
-    sources = args.csv or args.dumps
-    done: list[Extracted] = []
+    sources = asked.csv or asked.dumps
+    extract_one = _extractor(asked)
+    done: list[tuple[Path, Extracted]] = []
     for source in sources:
         try:
-            found = extract_one(source)
+            done.append((source, extract_one(source)))
         except (BadInput, DriverError) as error:
-            wipe()
             if len(sources) == 1:
                 raise
+            wipe()
             print(f"ridelog: {printable(str(error))}", file=sys.stderr)
-            continue
-        wipe()
-        done.append(found)
-        if not args.json:
-            print("\n".join(map(printable, lines(source, found))))
     if not done:
-        raise BadInput(f"expected a {'recording' if args.csv else 'dump'} that can be used, found none among "
+        raise BadInput(f"expected a {'recording' if asked.csv else 'dump'} that can be used, found none among "
                        f"{len(sources)}")
-    if args.json:
-        notes = {"notes": [note for each in done for note in each.notes]} if args.csv else {}
-        print(json.dumps({"runs": [one.as_json() for each in done for one in each.runs],
-                          **left_out_json(one for each in done for one in each.left_out),
-                          "torn_tail": any(each.torn_tail for each in done), **notes}))
-    return EXIT_DONE if len(done) == len(sources) else EXIT_CHECK_FAILED
+    found = [one for _, one in done]
+    said = {"runs": [one.as_json() for each in found for one in each.runs],
+            **left_out_json(one for each in found for one in each.left_out),
+            "torn_tail": any(each.torn_tail for each in found),
+            **({"notes": [note for each in found for note in each.notes]} if asked.csv else {})}
+    return Checked("\n".join(printable(words) for one in done for words in lines(*one)), said,
+                   len(done) == len(sources))
 
 
-def _of_dumps(args: argparse.Namespace) -> Callable[[Path], Extracted]:
-    from logger.api.extraction import extract_dump, name_of, read_measured_profile
-    from logger.commands.options import on_screen
-    from logger.service.config import load_config
-
-    if not args.dumps:
-        raise BadInput("extract: expected a DUMP, or --csv with a recording of a phone or another logger")
-    if given := next((one for one in CSV_OPTIONS if getattr(args, one) is not None), None):
-        raise BadInput(f"extract: expected --{given} together with --csv")
-    _refuse_again(args.dumps, [name_of(one) for one in args.dumps], "dumps")
-    config = load_config(args.config) if args.config else None
-    measured = read_measured_profile(args.profile) if args.profile else None
-    return lambda dump: extract_dump(dump, args.out, config, measured, on_screen(), args.vehicle)
-
-
-def _of_csv(args: argparse.Namespace) -> Callable[[Path], Extracted]:
+def _extractor(asked: ExtractQuestion) -> "Callable[[Path], Extracted]":
+    """What makes runs of one recording. BadInput for two that would have one folder, and wrong settings."""
     from logger.api.csv_extraction import CsvSettings, extract_csv, run_name
-    from logger.api.extraction import read_measured_profile
-    from logger.commands.options import on_screen
+    from logger.api.extraction import extract_dump, name_of, read_measured_profile
     from logger.service.config import load_config
     from logger.store.formats.logger_csv import named_columns
 
-    if args.dumps:
-        raise BadInput(f"extract: expected dumps or --csv, found both ({args.dumps[0]})")
-    if args.location is not None and len(args.csv) > 1:
-        raise BadInput(f"extract: expected one recording with --location, found {len(args.csv)}")
-    _refuse_again(args.csv, [run_name(one) for one in args.csv], "recordings")
-    asked = CsvSettings(named_columns(args.columns) if args.columns is not None else None, args.location, args.up,
-                  -1.0 if args.sign == "-" else 1.0, args.range, args.speed, args.vehicle)
-    config = load_config(args.config) if args.config else None
-    measured = read_measured_profile(args.profile) if args.profile else None
-    return lambda source: extract_csv(source, args.out, asked, config, measured, on_screen())
-
-
-def _refuse_again(sources: list[Path], names: list[str], what: str) -> None:
+    sources, name = (asked.csv, run_name) if asked.csv else (asked.dumps, name_of)
+    names = list(map(name, sources))
     if again := next((one for number, one in enumerate(sources) if names[number] in names[:number]), None):
-        raise BadInput(f"{again}: expected {what} of different names, so that each has a folder of its own")
+        raise BadInput(f"{again}: expected {'recordings' if asked.csv else 'dumps'} of different names, so that each "
+                       "has a folder of its own")
+    settings = CsvSettings(named_columns(asked.columns) if asked.columns is not None else None, asked.location,
+                           asked.up, -1.0 if asked.sign == "-" else 1.0, asked.range_g, asked.speed_mps, asked.vehicle)
+    config = load_config(asked.config) if asked.config else None
+    measured = read_measured_profile(asked.profile) if asked.profile else None
+    if asked.csv:
+        return lambda source: extract_csv(source, asked.out, settings, config, measured, asked.progress)
+    return lambda dump: extract_dump(dump, asked.out, config, measured, asked.progress, asked.vehicle)
 
 
-def lines(source: Path, found: Extracted) -> list[str]:
+def lines(source: Path, found: "Extracted") -> list[str]:
     """The lines for a person about a recording."""
     printed = [f"{source}: {note}" for note in found.notes]
     for one in found.runs:

@@ -1,36 +1,20 @@
-"""Hardware in the loop: play a recorded drive into serial ports for a running service, then check what it logged.
+"""``ridelog hil``: hardware in the loop."""
 
-  ridelog hil drive.dump.gz --nmea-port /dev/ttyUSB0 --accelerometer-port /dev/ttyUSB1
-  ridelog hil drive.dump.gz --log hil-log
-
-The bytes go out at the times at which they came. At the other end of the wires (two USB-serial adapters, or
-pseudo-terminals) a service that has just been started listens. Its log is compared with a replay of the same bytes
-under the same settings. With ports and --log: play, then compare. With ports alone: only play, for a service on
-another machine. With --log alone: only compare, with a copy of its folder.
-
-The readings of a chip such as the BMA220 are sent as a bridge microcontroller would: as lines, profile `lines`.
-Exit status 1 when the log does not agree, or the bytes were sent too late to decide.
-"""
-
-from __future__ import annotations
-
-import argparse
-import json
 import sys
 import time
 from contextlib import ExitStack
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from drivers.accelerometers import accelerometers, serial_accelerometers
 from drivers.accelerometers.accelerometer import SerialAccelerometer
 from drivers.dump import DumpReader, open_dump
 from drivers.hardware import open_serial
 from drivers.readings import GPS
-from logger.commands.options import on_screen, wipe
-from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
+from logger.errors import BadInput
 from logger.estimation.receiver_delay import CarriedDelay
+from logger.question import Argument, Checked, LongQuestion, Option, Verb, more_than_0
 from logger.records import WindowRecord
 from logger.report.quantities import known
 from logger.service.config import Config, find_config, load_config
@@ -45,34 +29,56 @@ WRITTEN_S = 2.0
 _MOVED_M = 1.0
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``ridelog hil``."""
-    parser.add_argument("dump", metavar="DUMP", type=Path, help="recorded drive (.dump or .dump.gz)")
-    parser.add_argument("--nmea-port", metavar="PORT", help="serial port wired to that of the service's GPS")
-    parser.add_argument("--accelerometer-port", metavar="PORT", help="serial port wired to that of its accelerometer")
-    parser.add_argument("--log", metavar="DIR", type=Path, help="folder of the service's logs, or a copy of it")
-    parser.add_argument("--config", metavar="FILE", type=Path, help="settings of the service (default: those of 'run')")
-    parser.add_argument("--seconds", metavar="N", type=float, help="only the first N seconds of the recording")
-    parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
+@dataclass(frozen=True, kw_only=True)
+class HilQuestion(LongQuestion):
+    """Hardware in the loop: play a recorded drive into serial ports for a running service, then check what it logged.
+
+      ridelog hil drive.dump.gz --nmea-port /dev/ttyUSB0 --accelerometer-port /dev/ttyUSB1
+      ridelog hil drive.dump.gz --log hil-log
+
+    The bytes go out at the times at which they came. At the other end of the wires (two USB-serial adapters, or
+    pseudo-terminals) a service that has just been started listens. Its log is compared with a replay of the same bytes
+    under the same settings. With ports and --log: play, then compare. With ports alone: only play, for a service on
+    another machine. With --log alone: only compare, with a copy of its folder.
+
+    The readings of a chip such as the BMA220 are sent as a bridge microcontroller would: as lines, profile `lines`.
+    Exit status 1 when the log does not agree, or the bytes were sent too late to decide.
+    """
+
+    dump: Annotated[Path, Argument("recorded drive (.dump or .dump.gz)", metavar="DUMP", read=Path)]
+    nmea_port: Annotated[str | None, Option("serial port wired to that of the service's GPS", metavar="PORT")] = None
+    accelerometer_port: Annotated[str | None, Option("serial port wired to that of its accelerometer",
+                                                     metavar="PORT")] = None
+    log: Annotated[Path | None, Option("folder of the service's logs, or a copy of it", metavar="DIR",
+                                       read=Path)] = None
+    config: Annotated[Path | None, Option("settings of the service (default: those of 'run')", metavar="FILE",
+                                          read=Path)] = None
+    seconds: Annotated[float | None, Option("only the first N seconds of the recording", metavar="N",
+                                            check=more_than_0)] = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if (self.nmea_port is None) != (self.accelerometer_port is None):
+            raise self.complaint("expected `nmea_port` and `accelerometer_port`, or neither")
+        if self.nmea_port is None and self.log is None:
+            raise self.complaint("expected two ports to play into, `log` DIR to compare with, or all three")
 
 
-def run(args: argparse.Namespace) -> int:
-    """Carry out ``ridelog hil``."""
-    if (args.nmea_port is None) != (args.accelerometer_port is None):
-        raise BadInput("expected --nmea-port and --accelerometer-port, or neither")
-    if args.nmea_port is None and args.log is None:
-        raise BadInput("expected two ports to play into, --log DIR to compare with, or all three")
-    if args.seconds is not None and not args.seconds > 0:
-        raise BadInput(f"--seconds {args.seconds:g}: expected more than 0")
-    config = load_config(find_config(args.config))
-    expected = _expected(args, config) if args.log is not None else None
-    sent = _play(args, config) if args.nmea_port is not None else None
+VERB = Verb(HilQuestion, "logger.commands.hil:played")
+
+
+def played(asked: HilQuestion) -> Checked:
+    """Play, compare, or both."""
+    config = load_config(find_config(asked.config))
+    expected = None if asked.log is None else _expected(asked, asked.log, config)
+    sent = _play(asked, config) if asked.nmea_port is not None else None
     if sent is not None and expected is not None:
         time.sleep(WRITTEN_S)
-    agreement = compare(expected, read_sessions(args.log), config.gps.bridge_s) if expected is not None else None
-    result = PlayedDrive(_bridged(args), sent, agreement)
-    print(json.dumps(result.as_json()) if args.json else result.text())
-    return EXIT_DONE if result.ok else EXIT_CHECK_FAILED
+    agreement = None
+    if expected is not None and asked.log is not None:
+        agreement = compare(expected, read_sessions(asked.log), config.gps.bridge_s)
+    result = PlayedDrive(_bridged(asked), sent, agreement)
+    return Checked(result.text(), result.as_json(), result.ok)
 
 
 @dataclass(frozen=True)
@@ -118,23 +124,23 @@ class PlayedDrive:
         return "\n".join(lines)
 
 
-def _bridged(args: argparse.Namespace) -> str:
-    with open_dump(args.dump) as reader:
+def _bridged(asked: HilQuestion) -> str:
+    with open_dump(asked.dump) as reader:
         kind = accelerometers()[reader.header.accelerometer["driver"]]
     return "" if isinstance(kind, SerialAccelerometer) else kind.title
 
 
-def _expected(args: argparse.Namespace, config: Config) -> list[WindowRecord]:
+def _expected(asked: HilQuestion, log: Path, config: Config) -> list[WindowRecord]:
     """What the service should log; fails before anything is played when the comparison could not be made."""
-    if not args.log.is_dir():
-        raise BadInput(f"{args.log}: expected the folder of the service's logs; the service makes it when it starts: "
+    if not log.is_dir():
+        raise BadInput(f"{log}: expected the folder of the service's logs; the service makes it when it starts: "
                        "ridelog run")
-    if args.nmea_port is not None and not list(args.log.glob("*.csv.part")):
-        raise BadInput(f"{args.log}: expected the open log (.csv.part) of a running service; start it: ridelog run")
-    with open_dump(args.dump) as reader:
-        expected = expected_rows(_wired(args, reader), config, f"{args.dump}:1", *_known_at_start(args.log))
+    if asked.nmea_port is not None and not list(log.glob("*.csv.part")):
+        raise BadInput(f"{log}: expected the open log (.csv.part) of a running service; start it: ridelog run")
+    with open_dump(asked.dump) as reader:
+        expected = expected_rows(_wired(asked, reader), config, f"{asked.dump}:1", *_known_at_start(log))
     if not any(row.utc_us is not None for row in expected):
-        raise BadInput(f"{args.dump}: expected GPS fixes with date and time in it, by which its rows are found")
+        raise BadInput(f"{asked.dump}: expected GPS fixes with date and time in it, by which its rows are found")
     return expected
 
 
@@ -150,31 +156,23 @@ def _known_at_start(folder: Path) -> tuple[CarriedDelay | None, KnownNoise | Non
     return receiver or read_delay(folder), noise
 
 
-def _play(args: argparse.Namespace, config: Config) -> Sent:
+def _play(asked: HilQuestion, config: Config) -> Sent:
     with ExitStack() as stack:
-        reader = stack.enter_context(open_dump(args.dump))
-        recording = _wired(args, reader)
+        reader = stack.enter_context(open_dump(asked.dump))
+        recording = _wired(asked, reader)
         sensor = str(recording.header.accelerometer["driver"])
         _, baud = serial_accelerometers()[sensor].line(config.accelerometer.sections[sensor])
-        bauds = {sensor: baud, GPS: config.gps.baud}
-        names = {sensor: args.accelerometer_port, GPS: args.nmea_port}
         ports = {}
-        for source, name in names.items():
-            ports[source] = open_serial(name, bauds[source])
+        for source, name, rate in ((sensor, asked.accelerometer_port, baud), (GPS, asked.nmea_port, config.gps.baud)):
+            ports[source] = open_serial(str(name), rate)
             stack.callback(ports[source].close)
-            print(f"{source} to {name} at {bauds[source]} baud", file=sys.stderr)
-        try:
-            return send(recording.events, ports, monotonic_us, time.sleep, _show)
-        finally:
-            wipe()
+            print(f"{source} to {name} at {rate} baud", file=sys.stderr)
+        return send(recording.events, ports, monotonic_us, time.sleep,
+                    lambda played_s: asked.progress(f"playing: {played_s:.0f} s"))
 
 
-def _wired(args: argparse.Namespace, reader: DumpReader) -> Wired:
-    return wired(reader.header, reader, args.seconds, f"{args.dump}:1")
-
-
-def _show(played_s: float) -> None:
-    on_screen()(f"playing: {played_s:.0f} s")
+def _wired(asked: HilQuestion, reader: DumpReader) -> Wired:
+    return wired(reader.header, reader, asked.seconds, f"{asked.dump}:1")
 
 
 def _sent_json(sent: Sent | None, in_time: bool) -> dict[str, Any] | None:

@@ -1,43 +1,64 @@
-"""Set up user, groups, units, rules and settings, and start the service. Settings that were changed stay.
+"""``ridelog install`` and ``ridelog uninstall``, step by step."""
 
-  sudo ridelog install --dry-run
-  sudo ridelog install
-
-'sudo ridelog install --dry-run' prints every step and takes none; 'ridelog uninstall' undoes it and keeps the logs.
-"""
-
-from __future__ import annotations
-
-import argparse
 import os
 import sys
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
 import logger
 from drivers.hardware import port_advice
-from logger.errors import EXIT_DONE, BadInput, RidelogError
+from logger.errors import BadInput, RidelogError
 from logger.installation import CONFIG, PROGRAM, Installation, InstallationStep, hidden_from_services, run_command
+from logger.question import Answer, Option, Question, Verb
 from logger.service.config import Config, load_config
 from logger.store.log.disk_quota import memory_notice
 
 _THIS_MACHINE = Path("/")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``ridelog install`` and ``ridelog uninstall``."""
-    parser.add_argument("--dry-run", action="store_true", help="print each step and take none")
-    parser.add_argument("--root", metavar="DIR", type=Path, default=_THIS_MACHINE,
-                        help="install into this folder instead, such as the mounted image of a card")
+@dataclass(frozen=True, kw_only=True)
+class InstallQuestion(Question):
+    """Set up user, groups, units, rules and settings, and start the service. Settings that were changed stay.
+
+      sudo ridelog install --dry-run
+      sudo ridelog install
+
+    'sudo ridelog install --dry-run' prints every step and takes none; 'ridelog uninstall' undoes it and keeps the logs.
+    """
+
+    dry_run: Annotated[bool, Option("print each step and take none")] = False
+    root: Annotated[Path, Option("install into this folder instead, such as the mounted image of a card (default: /)",
+                                 metavar="DIR", read=Path)] = _THIS_MACHINE
 
 
-def run(args: argparse.Namespace) -> int:
-    """Carry out ``ridelog install``. A dry run refuses what the real one would, but for the lack of rights."""
-    if args.root.resolve() == _THIS_MACHINE:
+class UninstallQuestion(InstallQuestion):
+    """Stop the service and take away the files that 'ridelog install' wrote, but for those that were changed since.
+
+      sudo ridelog uninstall --dry-run
+      sudo ridelog uninstall
+
+    The logs, the user ridelog who owns them and the program itself stay; --dry-run prints every step and takes none.
+    """
+
+
+VERB = Verb(InstallQuestion, "logger.commands.install:installed", has_json=False)
+UNINSTALL = Verb(UninstallQuestion, "logger.commands.install:uninstalled", has_json=False)
+
+
+def installed(asked: InstallQuestion) -> Answer:
+    """Install; what should be known of the machine. A dry run refuses what the real one would, but for the lack of
+    rights."""
+    if asked.root.resolve() == _THIS_MACHINE:
         _refuse_hidden(_program())
-    status = carry_out(installation(args).install(), args)
-    for notice in notices(args.root):
-        print(f"note: {notice}")
-    return status
+    carry_out(installation(asked).install(), asked)
+    return Answer("\n".join(f"note: {notice}" for notice in notices(asked.root)), {})
+
+
+def uninstalled(asked: UninstallQuestion) -> Answer:
+    """Take away what was installed."""
+    carry_out(installation(asked).uninstall(), asked)
+    return Answer("", {})
 
 
 def notices(root: Path) -> list[str]:
@@ -53,13 +74,13 @@ def notices(root: Path) -> list[str]:
     return list(filter(None, [in_memory, *(port_advice(port, root) for port in ports)]))
 
 
-def installation(args: argparse.Namespace) -> Installation:
-    """The installation that the arguments mean. Raises BadInput where there can be none."""
-    if not args.root.is_dir():
-        raise BadInput(f"{args.root}: expected a folder")
-    if args.root.resolve() != _THIS_MACHINE:
-        return Installation(args.root.resolve(), PROGRAM, run_command)
-    if os.geteuid() != 0 and not args.dry_run:
+def installation(asked: InstallQuestion) -> Installation:
+    """The installation that is asked for. Raises BadInput where there can be none."""
+    if not asked.root.is_dir():
+        raise BadInput(f"{asked.root}: expected a folder")
+    if asked.root.resolve() != _THIS_MACHINE:
+        return Installation(asked.root.resolve(), PROGRAM, run_command)
+    if os.geteuid() != 0 and not asked.dry_run:
         raise BadInput("expected to be run as root: sudo ridelog ... (--dry-run needs no rights)")
     return Installation(_THIS_MACHINE, _program(), run_command)
 
@@ -77,11 +98,10 @@ def _refuse_hidden(program: Path) -> None:
                            f"such as {PROGRAM.parent.parent}")
 
 
-def carry_out(steps: list[InstallationStep], args: argparse.Namespace) -> int:
+def carry_out(steps: list[InstallationStep], asked: InstallQuestion) -> None:
     """Print each step and, unless this is a dry run, take it. Raises CheckFailed or ``OSError`` at one that fails."""
     os.umask(0o022)  # the service's user reads its settings
     for step in steps:
         print(step.words, flush=True)
-        if step.act is not None and not args.dry_run:
+        if step.act is not None and not asked.dry_run:
             step.act()
-    return EXIT_DONE

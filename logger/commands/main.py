@@ -74,26 +74,27 @@ GROUPS = {
 """Verbs by what a person is about to do; each line begins with a verb and says which question it answers."""
 VERBS = {verb: meaning for group in GROUPS.values() for verb, meaning in group.items()}
 ASKED = {
-    "learn-car": "drive_questions:LEARN_CAR",
-    "identify": "identify.question:VERB",
-    "compare": "lab.question:COMPARE",
-    "diagnose": "lab.question:DIAGNOSE",
-    "add-effect": "lab.question:ADD_EFFECT",
-    "learn": "lab.question:LEARN",
-    "plan": "lab.question:PLAN",
-    "convert": "log_questions:CONVERT",
-    "fleet": "log_questions:FLEET",
-    "sections": "log_questions:SECTIONS",
-    "passes": "log_questions:PASSES",
-    "iri": "drive_questions:EXACT_IRI",
-    "estimate": "drive_questions:ESTIMATE",
-    "modes": "drive_questions:MODES",
-    "comfort": "drive_questions:COMFORT",
-    "calibrate": "drive_questions:CALIBRATE",
-    "simulate": "drive_questions:SIMULATE",
-    "fixed-point": "fixed_point:FIXED_POINT",
+    "learn-car": "api.drive_questions:LEARN_CAR",
+    "identify": "api.identify.question:VERB",
+    "compare": "api.lab.question:COMPARE",
+    "diagnose": "api.lab.question:DIAGNOSE",
+    "add-effect": "api.lab.question:ADD_EFFECT",
+    "learn": "api.lab.question:LEARN",
+    "plan": "api.lab.question:PLAN",
+    "convert": "api.log_questions:CONVERT",
+    "fleet": "api.log_questions:FLEET",
+    "sections": "api.log_questions:SECTIONS",
+    "passes": "api.log_questions:PASSES",
+    "iri": "api.drive_questions:EXACT_IRI",
+    "estimate": "api.drive_questions:ESTIMATE",
+    "modes": "api.drive_questions:MODES",
+    "comfort": "api.drive_questions:COMFORT",
+    "calibrate": "api.drive_questions:CALIBRATE",
+    "simulate": "api.drive_questions:SIMULATE",
+    "uninstall": "commands.install:UNINSTALL",
+    "fixed-point": "api.fixed_point:FIXED_POINT",
 }
-"""Verbs that are declared by a question, and where in ``logger.api``."""
+"""Verbs whose questions stand elsewhere than in a module of this folder, and where."""
 MOST_NAMED = 8
 """Of more files in one folder only their number is said: a screen still holds the result above."""
 EXIT_INTERRUPTED = 130
@@ -187,8 +188,10 @@ def main(arguments: list[str]) -> int:
 
 def command(verb: str) -> tuple[argparse.ArgumentParser, Callable[[argparse.Namespace], int]]:
     """The parser of a verb, and what carries it out."""
-    module: Any = (importlib.import_module("logger.commands.options").QuestionVerb(f"logger.api.{ASKED[verb]}")
-                   if verb in ASKED else importlib.import_module(f"logger.commands.{verb.replace('-', '_')}"))
+    place, _, name = ASKED.get(verb, f"commands.{verb}:VERB").partition(":")
+    module: Any = importlib.import_module(f"logger.{place}")
+    if hasattr(module, name):
+        module = importlib.import_module("logger.commands.options").QuestionVerb(getattr(module, name))
     parser = _Parser(prog=f"ridelog {verb}", description=module.__doc__, formatter_class=_Help, allow_abbrev=False)
     module.add_arguments(parser)
     return parser, module.run

@@ -1,4 +1,4 @@
-"""Verbs that are declared by their questions (``logger.api.question``): arguments, files to write, what is printed.
+"""Verbs that are declared by their questions (``logger.question``): arguments, files to write, what is printed.
 
 Beside them: pages and pictures of results with charts, and progress on the screen.
 """
@@ -15,16 +15,21 @@ from contextlib import contextmanager
 from dataclasses import MISSING
 from pathlib import Path
 from types import NoneType
-from typing import Any, get_args
+from typing import TYPE_CHECKING, Any, get_args
 
-from logger.api.question import (
+from logger.errors import BadInput, CheckFailed
+from logger.files import together, write_file
+from logger.printable import printable, word
+from logger.question import (
     Argument,
     Asking,
+    Hidden,
     InPython,
     LongQuestion,
     Option,
     Out,
     Question,
+    Several,
     Switches,
     Verb,
     Verbs,
@@ -32,22 +37,20 @@ from logger.api.question import (
     askings,
     help_of,
 )
-from logger.api.shown import CommandResult, check_outs
-from logger.chart_data import Chart
-from logger.errors import BadInput, CheckFailed
-from logger.files import together, write_file
-from logger.printable import printable, word
-from logger.report.charts import ENDINGS, drawn
 from logger.report.quantities import WIDTH
 from logger.units import LENGTH_UNITS_M
+
+if TYPE_CHECKING:
+    from logger.api.shown import CommandResult
+    from logger.chart_data import Chart
 
 
 class QuestionVerb:
     """A verb that is declared by its question, or verbs below it by theirs, as the modules of this folder declare
     one."""
 
-    def __init__(self, place: str) -> None:
-        self._verb: Verb | Verbs = _named(place)
+    def __init__(self, verb: Verb | Verbs) -> None:
+        self._verb = verb
         self.__doc__ = self._verb.words if isinstance(self._verb, Verbs) else help_of(self._verb.question)
 
     def add_arguments(self, parser: argparse.ArgumentParser) -> None:
@@ -69,7 +72,8 @@ def declare(parser: argparse.ArgumentParser, verb: Verb) -> None:
     for out in verb.outs:
         parser.add_argument(out.flag, type=Path, metavar=out.metavar, required=out.required, help=out.help,
                             **_many(out.many))
-    parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
+    if verb.has_json:
+        parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 
 
 def add_verbs(parser: argparse.ArgumentParser, dest: str, verbs: Mapping[str, tuple[Verb, str]]
@@ -93,7 +97,7 @@ _IN_PYTHON = re.compile(r"; in Python a model as well|\. In Python: .*$| \(in Py
 
 def _help(one: Asking) -> str:
     """What an option is, without what is of no use at the terminal."""
-    return _IN_PYTHON.sub("", one.help)
+    return argparse.SUPPRESS if isinstance(one.option, Hidden) else _IN_PYTHON.sub("", one.help)
 
 
 def _many(repeats: bool) -> dict[str, Any]:
@@ -114,8 +118,10 @@ def _add(parser: argparse.ArgumentParser, one: Asking) -> None:
         parser.add_argument(one.flag, dest=one.name, action="store_true", help=_help(one))
     else:
         parser.add_argument(one.flag, dest=one.name, required=one.default is MISSING, help=_help(one),
-                            metavar=option.metavar or "|".join(option.choices), **_many(option.many is not None),
-                            **({} if option.bare is None else {"nargs": "?", "const": option.bare}),
+                            metavar=option.metavar or "|".join(option.choices),
+                            **_many(option.many is not None and not isinstance(option, Several)),
+                            **({"nargs": "+"} if isinstance(option, Several) else
+                               {} if option.bare is None else {"nargs": "?", "const": option.bare}),
                             type=_reader(one.flag, option, one.kind))
 
 
@@ -197,11 +203,11 @@ def run(verb: Verb, args: argparse.Namespace) -> int:
         with respelled(verb.question):
             question = asked(verb, args)
             _check_outs(paths, question)
-            found = _named(verb.answers)(question)
+            found = named(verb.answers)(question)
     except CheckFailed as refusal:
-        if not (args.json and verb.refusal):
+        if not (verb.refusal and args.json):
             raise
-        print(json.dumps(_named(verb.refusal)(refusal), allow_nan=False))
+        print(json.dumps(named(verb.refusal)(refusal), allow_nan=False))
         print(f"ridelog: {refusal}", file=sys.stderr)
         return refusal.exit_status
     finally:
@@ -213,9 +219,9 @@ def run(verb: Verb, args: argparse.Namespace) -> int:
                 found.write(path, out.flag)
             write_result(pictures, found, question.named())
     written = {out.flag: those for out, those in paths.items()}
-    if args.json:
+    if verb.has_json and args.json:
         print(json.dumps(found.as_json(), allow_nan=False))
-    else:
+    elif found.text:
         words = found.next_words(question, written)
         print(found.text, *([f"\n{words}"] if words else []), sep="\n")
     for words in found.remarks(written):
@@ -223,7 +229,7 @@ def run(verb: Verb, args: argparse.Namespace) -> int:
     return int(found.exit_status)
 
 
-def _named(place: str) -> Any:
+def named(place: str) -> Any:
     """What a module and a name in it are: ``logger.api.lab.compare:compared``."""
     module, _, name = place.partition(":")
     return getattr(importlib.import_module(module), name)
@@ -238,6 +244,8 @@ def _check_outs(asked_for: Mapping[Out, list[Path]], question: Question) -> None
     """BadInput for a file that cannot be written, is read, or has an ending that is not offered."""
     if not any(asked_for.values()):
         return
+    from logger.api.shown import check_outs
+
     read = question.files_read()
     check_outs([(out.flag, path) for out, paths in asked_for.items() for path in paths], read, read)
     # Whatever it ends in, a file that is read is named as such first.
@@ -250,7 +258,7 @@ def _check_outs(asked_for: Mapping[Out, list[Path]], question: Question) -> None
 
 
 PAGE = ".html"
-PICTURES = (PAGE, *ENDINGS)
+PICTURES = (PAGE, ".png", ".svg", ".pdf")
 
 
 def is_picture(path: Path) -> bool:
@@ -276,6 +284,8 @@ def write_result(paths: Sequence[Path], found: CommandResult, of: str) -> None:
 def _drawn(path: Path, charts: Sequence[Chart]) -> bytes:
     if not charts:
         raise BadInput(f"--out {path}: expected a result with pictures, found one without; {PAGE} holds its words")
+    from logger.report.charts import drawn
+
     return drawn(charts, path)
 
 

@@ -1,22 +1,17 @@
-"""Make one web page of segment logs: an interactive map, curves and tables. It opens without a network.
+"""``ridelog report``: segment logs as one web page."""
 
-  ridelog report ridelog-demo --out drive.html
-  ridelog report /media/RIDELOG --out all.html --base roads.geojson
-"""
-
-from __future__ import annotations
-
-import argparse
-import json
 import re
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
-from logger.errors import EXIT_DONE, BadInput
+from logger.commands.options import PICTURES
+from logger.errors import BadInput
 from logger.files import write_file
 from logger.left_out import left_out_json, left_out_lines
 from logger.printable import counted
-from logger.report.charts import ENDINGS
+from logger.question import Answer, Argument, Option, Question, Verb
 from logger.report.maps import MapLine
 from logger.report.page import notices, page
 from logger.report.placed import of_files
@@ -28,47 +23,57 @@ STREETS = "https://tile.openstreetmap.org/{z}/{x}/{y}.png"
 """Where pictures of streets come from when they are asked for: OpenStreetMap's standard tiles."""
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``ridelog report``."""
-    parser.add_argument("logs", metavar="LOGS", type=Path, nargs="+",
-                        help="log files, folders of them, exported sticks; a log that is there twice counts once")
-    parser.add_argument("--out", metavar="FILE.html", type=Path, required=True, help="page to write")
-    parser.add_argument("--base", metavar="ROADS.geojson", type=Path,
-                        help="roads to draw beneath the drives, such as an extract of OpenStreetMap, kept in the page")
-    parser.add_argument("--tiles", metavar="ADDRESS", nargs="?", const=STREETS, default="",
-                        help="draw pictures of streets beneath the drives: the page then asks a server for them "
-                             "(with {z}, {x} and {y} in the address; by default OpenStreetMap's)")
-    parser.add_argument("--json", action="store_true", help="also print the summary, as one JSON object")
-
-
-def run(args: argparse.Namespace) -> int:
-    """Carry out ``ridelog report``."""
-    _check_tiles(args.tiles)
-    if args.out.suffix.lower() in ENDINGS:
-        raise BadInput(f"--out {args.out}: expected the name of a web page, such as {args.out.stem}.html")
-    base = [] if args.base is None else [MapLine("", *line) for line in read_road_lines(args.base)]
-    files = write_report(find_logs_in(args.logs), args.out, base=base,
-                         base_name="" if args.base is None else args.base.name, tiles_from=args.tiles)
-    records = [record for file in files for record in file.records]
-    if args.json:
-        print(json.dumps({"report": str(args.out), "files": [file.name for file in files],
-                          "summary": summary_json(summarise(records)), "notices": notices(files),
-                          **left_out_json(of_files(files))}))
-    else:
-        print(f"Report: {args.out} ({counted(len(records), 'window')} from {counted(len(files), 'file')})",
-              *notices(files), *left_out_lines(of_files(files)), sep="\n")
-    return EXIT_DONE
-
-
-def _check_tiles(address: str) -> None:
+def _tiles(address: str) -> None:
     whole = re.fullmatch(r"https?://[\w.-]+(:\d+)?/\S*", address, re.ASCII)
     if address and not (whole and all(key in address for key in ("{z}", "{x}", "{y}"))):
-        raise BadInput(f"--tiles: expected an address such as {STREETS}, found {address!r}")
+        raise ValueError(f"expected an address such as {STREETS}")
+
+
+def _web_page(out: Path) -> None:
+    if out.suffix.lower() in PICTURES[1:]:
+        raise ValueError(f"expected the name of a web page, such as {out.stem}.html")
+
+
+@dataclass(frozen=True, kw_only=True)
+class ReportQuestion(Question):
+    """Make one web page of segment logs: an interactive map, curves and tables.
+
+      ridelog report ridelog-demo --out drive.html
+      ridelog report /media/RIDELOG --out all.html --base roads.geojson
+
+    It opens without a network.
+    """
+
+    logs: Annotated[list[Path], Argument(
+        "log files, folders of them, exported sticks; a log that is there twice counts once", metavar="LOGS", read=Path,
+        many=list)]
+    out: Annotated[Path, Option("page to write", metavar="FILE.html", read=Path, check=_web_page)]
+    base: Annotated[Path | None, Option(
+        "roads to draw beneath the drives, such as an extract of OpenStreetMap, kept in the page",
+        metavar="ROADS.geojson", read=Path)] = None
+    tiles: Annotated[str, Option(
+        "draw pictures of streets beneath the drives: the page then asks a server for them (with {z}, {x} and {y} in "
+        "the address; by default OpenStreetMap's)", metavar="ADDRESS", bare=STREETS, check=_tiles)] = ""
+
+
+VERB = Verb(ReportQuestion, "logger.commands.report:reported")
+
+
+def reported(asked: ReportQuestion) -> Answer:
+    """Write the page."""
+    base = [] if asked.base is None else [MapLine("", *line) for line in read_road_lines(asked.base)]
+    files = write_report(find_logs_in(asked.logs), asked.out, base=base,
+                         base_name="" if asked.base is None else asked.base.name, tiles_from=asked.tiles)
+    records = [record for file in files for record in file.records]
+    lines = [f"Report: {asked.out} ({counted(len(records), 'window')} from {counted(len(files), 'file')})",
+             *notices(files), *left_out_lines(of_files(files))]
+    return Answer("\n".join(lines), {
+        "report": str(asked.out), "files": [file.name for file in files],
+        "summary": summary_json(summarise(records)), "notices": notices(files), **left_out_json(of_files(files))})
 
 
 def write_report(logs: Sequence[tuple[Path, Path | None]], out: Path, *, base: Sequence[MapLine] = (),
-                 base_name: str = "",
-                 tiles_from: str = "") -> list[LoggedFile]:
+                 base_name: str = "", tiles_from: str = "") -> list[LoggedFile]:
     """Write the page of log files, whole or not at all; give what was read, each named from the folder beside it on.
 
     What a service has finished since is read as what it has become, what it has removed to make room is left out.

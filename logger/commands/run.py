@@ -1,41 +1,47 @@
-"""Read the sensors, cut the drive into windows and write the logs: the service itself.
+"""``ridelog run``: the service."""
 
-  ridelog run
-  ridelog run --config ridelog.yaml
-
-Exit status 0: you stopped it; 1: the system failed; 2: the settings are wrong (correct them first).
-systemd starts it; SIGTERM and Ctrl-C finish the current window and close the files.
-"""
-
-from __future__ import annotations
-
-import argparse
 import logging
 import os
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
-from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, RidelogError
+from logger.errors import RidelogError
+from logger.question import Checked, Option, Question, Verb
 from logger.service.config import find_config, load_config
 from logger.service.systemd_notify import Stop, stopped_by_signals
 
 PAUSE_S = 30
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Arguments of ``ridelog run``."""
-    parser.add_argument("--config", metavar="FILE", type=Path, help="settings (default: the machine's)")
+@dataclass(frozen=True, kw_only=True)
+class RunQuestion(Question):
+    """Read the sensors, cut the drive into windows and write the logs: the service itself.
+
+      ridelog run
+      ridelog run --config ridelog.yaml
+
+    Exit status 0: you stopped it; 1: the system failed; 2: the settings are wrong (correct them first).
+    systemd starts it; SIGTERM and Ctrl-C finish the current window and close the files.
+    """
+
+    config: Annotated[Path | None, Option("settings (default: the machine's)", metavar="FILE", read=Path)] = None
 
 
-def run(args: argparse.Namespace) -> int:
-    """Carry out ``ridelog run``."""
+VERB = Verb(RunQuestion, "logger.commands.run:served", has_json=False)
+
+
+def served(asked: RunQuestion) -> Checked:
+    """Serve until it is told to stop."""
     logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
     with stopped_by_signals() as stop:
-        return _served(args, stop)
+        return Checked("", {}, _is_served(asked, stop))
 
 
-def _served(args: argparse.Namespace, stop: Stop) -> int:
+def _is_served(asked: RunQuestion, stop: Stop) -> bool:
+    """Whether it was told to stop, and did not stop by itself."""
     try:
-        config = load_config(find_config(args.config))
+        config = load_config(find_config(asked.config))
         from logger.service.serve import serve
 
         serve(config, stop)
@@ -49,8 +55,8 @@ def _served(args: argparse.Namespace, stop: Stop) -> int:
         logging.getLogger(__name__).error("stopped by the system: %s", error)
         if _is_restarted():
             stop.wait(PAUSE_S)
-        return EXIT_CHECK_FAILED
-    return EXIT_DONE
+        return False
+    return True
 
 
 def _is_restarted() -> bool:

@@ -1,22 +1,15 @@
-"""Say what the running service is doing, and what to do next. Exit status 1 when it is not running, or hangs.
+"""``ridelog status``: what the service is doing, and what to do about what is wrong."""
 
-  ridelog status
-  ridelog status --json
-"""
-
-from __future__ import annotations
-
-import argparse
-import json
 import time
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Annotated
 
 from drivers.accelerometers import accelerometers
 from drivers.hardware import port_advice
 from drivers.sources import serial_advice
-from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE
 from logger.printable import printable
+from logger.question import Checked, Option, Question, Verb
 from logger.service.config import find_config, load_config
 from logger.service.status import SensorStatus, ServiceStatus, StorageStatus, process_exists, read_status, trouble
 from logger.store.export.sticks import FOLDER, StickNote, read_notes
@@ -27,22 +20,31 @@ _JOURNAL = "See why: journalctl -u ridelog -n 50"
 _LITTLE_ROOM_BYTES = 200_000_000
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("--config", type=Path, metavar="FILE", help="settings of the service (default: those of 'run')")
-    parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
+@dataclass(frozen=True, kw_only=True)
+class StatusQuestion(Question):
+    """Say what the running service is doing, and what to do next.
+
+      ridelog status
+      ridelog status --json
+
+    Exit status 1 when it is not running, or hangs.
+    """
+
+    config: Annotated[Path | None, Option("settings of the service (default: those of 'run')", metavar="FILE",
+                                          read=Path)] = None
 
 
-def run(args: argparse.Namespace) -> int:
-    status = read_status(load_config(find_config(args.config)).status_file)
+VERB = Verb(StatusQuestion, "logger.commands.status:answered")
+
+
+def answered(asked: StatusQuestion) -> Checked:
+    """What the service says of itself, with what is wrong with it."""
+    status = read_status(load_config(find_config(asked.config)).status_file)
     fault = trouble(status, time.monotonic_ns() // 1000, status is not None and process_exists(status.pid))
     notes = read_notes(FOLDER)
-    if args.json:
-        known = {} if status is None else asdict(status)
-        sticks = [asdict(note) for note in notes]
-        print(json.dumps({"running": fault is None, "trouble": fault, "sticks": sticks, **known}))
-    else:
-        print("\n".join([*stick_lines(notes), *screen(status, fault)]))
-    return EXIT_DONE if fault is None else EXIT_CHECK_FAILED
+    said = {"running": fault is None, "trouble": fault, "sticks": [asdict(note) for note in notes],
+            **({} if status is None else asdict(status))}
+    return Checked("\n".join([*stick_lines(notes), *screen(status, fault)]), said, fault is None)
 
 
 def stick_lines(notes: list[StickNote]) -> list[str]:

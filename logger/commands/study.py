@@ -1,29 +1,16 @@
-"""Reproduce a table or a figure of the reference dissertation, or of other papers, with its printed values.
+"""``ridelog study``: what the studies print, beside what was printed."""
 
-  ridelog study --list
-  ridelog study table-4-4
-  ridelog study fig-4-27 --out fig-4-27.html
-  ridelog study all --quick --out studies
-  ridelog study field --out studies
-  ridelog study lira-cd DIR --vehicle mycar.yaml
-
-Each printed item ends in one of four words: agrees, misprint, better, not reproducible. Where the dissertation
-measured, the study simulates under the conditions that its text gives: the records were never published.
-"""
-
-from __future__ import annotations
-
-import argparse
-import json
 import sys
+from collections.abc import Iterator
+from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
 from textwrap import fill
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
-from logger.api.shown import check_outs
-from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
+from logger.errors import BadInput
 from logger.files import make_folder, together, write_text
+from logger.question import Answer, Argument, Checked, Option, Question, Verb
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
@@ -35,78 +22,97 @@ _WIDTH, _NARROWEST = 118, 24
 _BAR = 30
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("name", nargs="?", metavar="NAME",
-                        help="the study, as --list names it; dissertation, field (other papers) or roads (public "
-                             "records): all of that group; or all")
-    parser.add_argument("folder", nargs="?", type=Path, metavar="DIR", help="the data of a study that needs some")
-    parser.add_argument("--list", action="store_true", help="list the studies there are")
-    parser.add_argument("--quick", action="store_true", help="a tenth of the draws and grid points")
-    parser.add_argument("--out", type=Path, metavar="PLACE",
-                        help="also write a page with tables and pictures; for all: a folder of pages with index.html")
-    parser.add_argument("--vehicle", metavar="NAME|FILE", help="the car of a study of records of a road")
-    parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
+@dataclass(frozen=True, kw_only=True)
+class StudyQuestion(Question):
+    """Reproduce a table or a figure of the reference dissertation, or of other papers, with its printed values.
+
+      ridelog study --list
+      ridelog study table-4-4
+      ridelog study fig-4-27 --out fig-4-27.html
+      ridelog study all --quick --out studies
+      ridelog study field --out studies
+      ridelog study lira-cd DIR --vehicle mycar.yaml
+
+    Each printed item ends in one of four words: agrees, misprint, better, not reproducible. Where the dissertation
+    measured, the study simulates under the conditions that its text gives: the records were never published.
+    """
+
+    name: Annotated[str | None, Argument(
+        "the study, as --list names it; dissertation, field (other papers) or roads (public records): all of that "
+        "group; or all", metavar="NAME")] = None
+    folder: Annotated[Path | None, Argument("the data of a study that needs some", metavar="DIR", read=Path)] = None
+    listed: Annotated[bool, Option("list the studies there are", flag="--list")] = False
+    quick: Annotated[bool, Option("a tenth of the draws and grid points")] = False
+    out: Annotated[Path | None, Option(
+        "also write a page with tables and pictures; for all: a folder of pages with index.html", metavar="PLACE",
+        read=Path)] = None
+    vehicle: Annotated[str | None, Option("the car of a study of records of a road", metavar="NAME|FILE")] = None
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.listed and self.name not in (None, *SHELF_NAMES):
+            raise self.complaint(f"study `listed`: expected no NAME with it, found {self.name}")
+        if self.listed and (given := "quick" * self.quick or "out" * (self.out is not None)):
+            raise self.complaint(f"study `{given}`: expected a NAME with it, not `listed`")
+        if not self.listed and self.name is None:
+            raise self.complaint("study: expected the NAME of a study, all, or `listed`")
+
+    @property
+    def share(self) -> float:
+        """Of the draws and grid points."""
+        return QUICK_SHARE if self.quick else 1.0
 
 
-def run(args: argparse.Namespace) -> int:
-    """Carry out ``ridelog study``."""
+VERB = Verb(StudyQuestion, "logger.commands.study:answered")
+
+
+def answered(asked: StudyQuestion) -> Answer:
+    """The list, one study, or every study of a group that needs no data of its own."""
     from logger.studies.study import studies, study_of
 
-    shelf = args.name if args.name in SHELF_NAMES else None
-    known = studies(shelf)
-    if args.list:
-        if args.name != shelf:
-            raise BadInput(f"study --list: expected no NAME with it, found {args.name}")
-        for option, value in (("--quick", args.quick), ("--out", args.out)):
-            if value:
-                raise BadInput(f"study {option}: expected a NAME with it, not --list")
-        _list(list(known.values()), args.json)
-        return EXIT_DONE
-    if args.name is None:
-        raise BadInput("study: expected the NAME of a study, all, or --list")
-    if args.name in ("all", shelf):
-        return _all(list(known.values()), args)
-    return _one(study_of(args.name, known), args)
+    known = studies(asked.name if asked.name in SHELF_NAMES else None)
+    if asked.listed:
+        return Answer("\n".join(_list(list(known.values()))), {"studies": list(map(_in_short, known.values()))})
+    assert asked.name is not None
+    if asked.name in ("all", *SHELF_NAMES):
+        return _all(list(known.values()), asked)
+    return _one(study_of(asked.name, known), asked)
 
 
-def _one(study: Study, args: argparse.Namespace) -> int:
+def _one(study: "Study", asked: StudyQuestion) -> Answer:
+    from logger.api.shown import check_outs
     from logger.studies.study import Workload
 
-    if study.data and args.folder is None:
+    if study.data and asked.folder is None:
         raise BadInput(f"study {study.called}: expected DIR, {study.data}")
-    if not study.data and args.folder is not None:
-        raise BadInput(f"study {study.called}: expected no DIR, found {args.folder}")
-    if not study.data and args.vehicle is not None:
-        raise BadInput(f"study {study.called}: expected no --vehicle, found {args.vehicle}")
-    check_outs([("--out", args.out)])
-    show = show_progress if sys.stderr.isatty() else _show_nothing
-    result = study.run(Workload(QUICK_SHARE if args.quick else 1.0, show, args.folder, args.vehicle))
-    if args.out is not None:
+    if not study.data and asked.folder is not None:
+        raise BadInput(f"study {study.called}: expected no DIR, found {asked.folder}")
+    if not study.data and asked.vehicle is not None:
+        raise BadInput(f"study {study.called}: expected no --vehicle, found {asked.vehicle}")
+    check_outs([("--out", asked.out)])
+    show = show_progress if sys.stderr.isatty() else lambda _done, _of: None
+    result = study.run(Workload(asked.share, show, asked.folder, asked.vehicle))
+    if asked.out is not None:
         from logger.report.study_page import page
 
-        write_text(args.out, page(study, result, share=QUICK_SHARE if args.quick else 1.0))
-    if args.json:
-        print(json.dumps(as_json(study, result), allow_nan=False))
-    else:
-        print("\n".join(lines(study, result)))
-    return EXIT_CHECK_FAILED if study.differs(result) else EXIT_DONE
+        write_text(asked.out, page(study, result, share=asked.share))
+    return Checked("\n".join(lines(study, result)), as_json(study, result), not study.differs(result))
 
 
-def _all(known: list[Study], args: argparse.Namespace) -> int:
-    """Every study that needs no data of its own; pages of each and of all."""
+def _all(known: list["Study"], asked: StudyQuestion) -> Answer:
+    """Pages of each study and of all."""
     from logger.report.study_page import index, page
     from logger.studies.all_studies import carry_out_all
 
-    if args.out is None:
+    if asked.out is None:
         raise BadInput("study all: expected --out DIR, a folder for its pages")
-    if args.folder is not None:
-        raise BadInput(f"study all: expected no DIR, found {args.folder}")
-    make_folder(args.out)
+    if asked.folder is not None:
+        raise BadInput(f"study all: expected no DIR, found {asked.folder}")
+    make_folder(asked.out)
     chosen = [one for one in known if not one.data]
-    share = QUICK_SHARE if args.quick else 1.0
     carried = {}
     try:
-        for study, found in carry_out_all(chosen, share):
+        for study, found in carry_out_all(chosen, asked.share):
             carried[study.called] = found
             print(f"[{len(carried):{len(str(len(chosen)))}} of {len(chosen)}] {study.called}: "
                   f"{found.failure or study.words} ({found.seconds:.1f} s)", file=sys.stderr, flush=True)
@@ -114,16 +120,14 @@ def _all(known: list[Study], args: argparse.Namespace) -> int:
         with together():
             for study in known:
                 if study.called in carried and (result := carried[study.called].result) is not None:
-                    write_text(args.out / f"{study.called}.html", page(study, result, "index.html", share))
-            write_text(args.out / "index.html", index(known, carried, share))
+                    write_text(asked.out / f"{study.called}.html", page(study, result, "index.html", asked.share))
+            write_text(asked.out / "index.html", index(known, carried, asked.share))
     failed = [one for one in chosen if carried[one.called].failure]
-    if args.json:
-        print(json.dumps({"page": str(args.out / "index.html"), "studies": [
-            {**_in_short(one), "seconds": round(carried[one.called].seconds, 2),
-             "failure": carried[one.called].failure or None} for one in chosen]}))
-    else:
-        print(f"{len(chosen)} studies, {len(failed)} not as they state. Page: {args.out / 'index.html'}")
-    return EXIT_CHECK_FAILED if failed else EXIT_DONE
+    said = {"page": str(asked.out / "index.html"), "studies": [
+        {**_in_short(one), "seconds": round(carried[one.called].seconds, 2),
+         "failure": carried[one.called].failure or None} for one in chosen]}
+    return Checked(f"{len(chosen)} studies, {len(failed)} not as they state. Page: {asked.out / 'index.html'}", said,
+                   not failed)
 
 
 def show_progress(done: int, of: int) -> None:
@@ -133,23 +137,16 @@ def show_progress(done: int, of: int) -> None:
           flush=True)
 
 
-def _show_nothing(_done: int, _of: int) -> None:
-    pass
-
-
-def _list(known: list[Study], wants_json: bool) -> None:
-    if wants_json:
-        print(json.dumps({"studies": [_in_short(one) for one in known]}))
-        return
+def _list(known: list["Study"]) -> Iterator[str]:
     if not known:
-        print("No studies in this group.")
+        yield "No studies in this group."
         return
     name, where, words = (max(len(getattr(one, what)) for one in known) for what in ("called", "where", "words"))
     for one in known:
-        print(f"{one.called:{name}}  {one.words:{words}}  {one.where:{where}}  {one.title}")
+        yield f"{one.called:{name}}  {one.words:{words}}  {one.where:{where}}  {one.title}"
 
 
-def _in_short(study: Study) -> dict[str, Any]:
+def _in_short(study: "Study") -> dict[str, Any]:
     return {"name": study.called, "where": study.where, "title": study.title, "covers": list(study.covers),
             "words": study.words, "items": [{"item": one.name, "word": str(one.word), "because": one.because}
                                             for one in study.items]}
@@ -158,7 +155,7 @@ def _in_short(study: Study) -> dict[str, Any]:
 # --- what is shown ---
 
 
-def lines(study: Study, result: Result) -> list[str]:
+def lines(study: "Study", result: "Result") -> list[str]:
     """What a person reads."""
     shown = [f"{study.where}: {study.title}", fill(study.how, _WIDTH)]
     for table in result.all_tables:
@@ -169,7 +166,7 @@ def lines(study: Study, result: Result) -> list[str]:
             fill(result.verdict, _WIDTH)]
 
 
-def _table_lines(table: Table) -> list[str]:
+def _table_lines(table: "Table") -> list[str]:
     """Columns as wide as what is in them; headings, and words where the line would be too long, are broken."""
     cells = [[column.text(cell) for column, cell in zip(table.columns, row, strict=True)] for row in table.rows]
     widths = [max(max((len(row[index]) for row in cells), default=0), max(map(len, column.name.split())))
@@ -192,7 +189,7 @@ def _broken(cells: list[str], widths: list[int], lowest: bool = False) -> list[t
                     strict=True))
 
 
-def as_json(study: Study, result: Result) -> dict[str, Any]:
+def as_json(study: "Study", result: "Result") -> dict[str, Any]:
     """All of it for a program; null for what is not there or has no number."""
     return {
         "study": study.called, **{key: value for key, value in _in_short(study).items() if key != "name"},
@@ -204,7 +201,7 @@ def as_json(study: Study, result: Result) -> dict[str, Any]:
     }
 
 
-def _figure(one: Chart) -> dict[str, Any]:
+def _figure(one: "Chart") -> dict[str, Any]:
     from logger.chart_data import Bars, Field
 
     if isinstance(one, Bars):
@@ -217,5 +214,5 @@ def _figure(one: Chart) -> dict[str, Any]:
                               for line in one.lines]}
 
 
-def _known(cell: Cell) -> Cell:
+def _known(cell: "Cell") -> "Cell":
     return None if isinstance(cell, float) and not isfinite(cell) else cell

@@ -1,62 +1,60 @@
-"""Check segment logs and recorded dumps: count good, torn and corrupt records, and gaps. A stick that 'ridelog export'
-filled is also compared with its manifest. There each file is a record, and each file missing or not listed is a gap.
+"""``ridelog verify``: what is damaged or missing in logs, recordings and sticks."""
 
-  ridelog verify /var/lib/ridelog
-  ridelog verify /media/RIDELOG --json
-
-Exit status 0: nothing is wrong; 1: something is, and it is listed. Two things are not wrong: the torn end of a log
-that is still open, and a sensor that is silent in a dump (a gap).
-"""
-
-from __future__ import annotations
-
-import argparse
-import json
+from collections.abc import Iterator
+from dataclasses import dataclass
 from pathlib import Path
+from typing import Annotated
 
-from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE
-from logger.printable import printable
+from logger.printable import counted, printable
+from logger.question import Argument, Checked, Question, Verb
 from logger.store.integrity import FileCheck, verify
 
 _COUNTS = ("records_good", "records_torn", "records_corrupt", "gaps")
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Declare the arguments of the verb."""
-    parser.add_argument("paths", nargs="+", type=Path, metavar="PATH",
-                        help="a log, a dump, a manifest, or a folder of them")
-    parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
+@dataclass(frozen=True, kw_only=True)
+class VerifyQuestion(Question):
+    """Check segment logs and recorded dumps: count good, torn and corrupt records, and gaps. A stick that 'ridelog
+    export' filled is also compared with its manifest. There each file is a record, and each file missing or not listed
+    is a gap.
+
+      ridelog verify /var/lib/ridelog
+      ridelog verify /media/RIDELOG --json
+
+    Exit status 0: nothing is wrong; 1: something is, and it is listed. Two things are not wrong: the torn end of a log
+    that is still open, and a sensor that is silent in a dump (a gap).
+    """
+
+    paths: Annotated[list[Path], Argument("a log, a dump, a manifest, or a folder of them", metavar="PATH", read=Path,
+                                          many=list)]
 
 
-def run(args: argparse.Namespace) -> int:
-    """Check and print. Raises BadInput for a path that is not there or is neither log nor dump."""
-    checks = verify(args.paths)
+VERB = Verb(VerifyQuestion, "logger.commands.verify:verified")
+
+
+def verified(asked: VerifyQuestion) -> Checked:
+    """Check. Raises BadInput for a path that is not there or is neither log nor dump."""
+    checks = verify(asked.paths)
     ok = all(check.ok for check in checks)
-    if args.json:
-        print(json.dumps(_as_json(checks, ok)))
-    else:
-        _print_text(checks, ok)
-    return EXIT_DONE if ok else EXIT_CHECK_FAILED
+    files = [{"path": str(check.path), "kind": check.kind, "state": check.state, "ok": check.ok,
+              **_totals([check]), "problems": list(check.problems), "notes": list(check.notes)} for check in checks]
+    return Checked("\n".join(map(printable, _lines(checks, ok))), {"ok": ok, **_totals(checks), "files": files}, ok)
 
 
 def _totals(checks: list[FileCheck]) -> dict[str, int]:
     return {name: sum(getattr(check, name) for check in checks) for name in _COUNTS}
 
 
-def _as_json(checks: list[FileCheck], ok: bool) -> dict[str, object]:
-    files = [{"path": str(check.path), "kind": check.kind, "state": check.state, "ok": check.ok,
-              **_totals([check]), "problems": list(check.problems), "notes": list(check.notes)} for check in checks]
-    return {"ok": ok, **_totals(checks), "files": files}
-
-
-def _print_text(checks: list[FileCheck], ok: bool) -> None:
-    for check in checks:
+def _lines(checks: list[FileCheck], ok: bool) -> Iterator[str]:
+    """The answer; then each file that something is wrong with, then the others."""
+    yield f"{'ok' if ok else 'WRONG'}: {counted(len(checks), 'file')}, {_counts_in_words(_totals(checks))}"
+    for check in sorted(checks, key=lambda one: one.ok):
         state = ", open" if check.state == "open" else ""
-        print(f"{printable(str(check.path))} ({check.kind}{state}): {_counts_in_words(_totals([check]))}")
-        for words in (*check.problems, *check.notes):
-            print(f"    {printable(words)}")
-    files = "1 file" if len(checks) == 1 else f"{len(checks)} files"
-    print(f"{'ok' if ok else 'WRONG'}: {files}, {_counts_in_words(_totals(checks))}")
+        yield f"{check.path} ({check.kind}{state}): {_counts_in_words(_totals([check]))}"
+        yield from (f"    {words}" for words in (*check.problems, *check.notes))
+    if not ok:
+        yield ("What to do: no command reads a torn or corrupt record; all others count."
+               + " Export to the stick again." * any(not check.ok and check.kind == "manifest" for check in checks))
 
 
 def _counts_in_words(counts: dict[str, int]) -> str:

@@ -338,7 +338,6 @@ def _part(text: str) -> Html:
     return html('<p class="lines">{}</p>', "\n".join(lines))
 
 
-ENDINGS = (".png", ".svg", ".pdf")
 _LINE_COLOURS = tuple(CLASS_COLOURS[number] for number in SERIES)
 
 

@@ -13,7 +13,10 @@ import pytest
 
 import ridelog
 from logger.api.drive_questions import ModesCommand, ModesQuestion, RandomRoadQuestion
-from logger.api.question import (
+from logger.commands import options
+from logger.commands.main import ASKED
+from logger.errors import BadInput
+from logger.question import (
     Argument,
     Asking,
     Notify,
@@ -28,9 +31,6 @@ from logger.api.question import (
     help_of,
     silent,
 )
-from logger.commands import options
-from logger.commands.main import ASKED
-from logger.errors import BadInput
 
 
 def _pair(text: str) -> tuple[str, float]:
@@ -116,7 +116,7 @@ def test_the_function_has_the_questions_fields_and_words() -> None:
 
 
 def every_option() -> list[tuple[str, Asking]]:
-    asked = {verb: options._named(f"logger.api.{place}") for verb, place in ASKED.items()}
+    asked = {verb: options.named(f"logger.{place}") for verb, place in ASKED.items()}
     return [(verb, one) for verb, found in asked.items()
             for verbs in [[below for below, _ in found.below.values()] if isinstance(found, Verbs) else [found]]
             for each in verbs for one in askings(each.question)]

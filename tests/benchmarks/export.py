@@ -27,11 +27,10 @@ LINEAR = 1.3
 """Twice the files in at most twice the time, and three tenths for a busy machine."""
 
 EXPORT = """
-import argparse, re, sys, time
+import re, sys, time
 from pathlib import Path
-from logger.commands.export import add_arguments, run
-parser = argparse.ArgumentParser()
-add_arguments(parser)
+from logger.commands.main import command
+parser, run = command("export")
 begun = time.process_time()
 status = run(parser.parse_args(sys.argv[1:]))
 most_kb = re.search(r"VmHWM:\\s*(\\d+)", Path("/proc/self/status").read_text())[1]

@@ -14,9 +14,9 @@ from numpy.typing import NDArray
 import ridelog
 from logger.api.lab.bench import among, bench_with
 from logger.api.lab.question import CompareQuestion
-from logger.api.question import USUAL_TOLERANCE
 from logger.lab.diagnosis import diagnose
 from logger.lab.likelihood.distance_error import USUAL
+from logger.question import USUAL_TOLERANCE
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
 from logger.vehicle.named_parameters import free_parameters_of

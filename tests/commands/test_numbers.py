@@ -7,9 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from logger.api.question import Range, named_numbers
+from logger.api.shared_fields import named_numbers
 from logger.commands.main import main
 from logger.errors import BadInput
+from logger.question import Range
 
 
 @pytest.mark.parametrize(("within", "value"), [(Range(10.0, 1000.0, "Hz"), 10.0), (Range(10.0, 1000.0, "Hz"), 1e3),

@@ -35,7 +35,7 @@ def test_a_command_that_is_nearly_right_is_guessed(capsys: pytest.CaptureFixture
     (["road", "generate", "--clas", "B"], "there is no option --clas; did you mean --class? (try"),
     (["iri", "p.csv", "q.csv"], "expected no q.csv (try"),
     (["fleet", "frob"], "expected one of 'ingest', 'summarise', 'report', found 'frob' (try"),
-    (["convert", "logs"], "expected --to (try"), (["export"], "expected --to (try"),
+    (["convert", "logs"], "expected --to (try"),
     (["demo", "--lab", "--field"], "--field: expected no --lab with it (try"),
 ])
 def test_wrong_use_is_said_as_everything_else(
@@ -49,6 +49,7 @@ def test_wrong_use_is_said_as_everything_else(
 @pytest.mark.parametrize(("arguments", "said"), [
     (["modes", "p.csv", "--from", "3ft"], "--from 3ft: expected a number, without its unit"),
     (["comfort", "p.csv", "--unit", "ft"], "--unit ft: expected one of mps2, g"),
+    (["export"], "export: expected --to DIR"), (["export", "--to", "a", "--removed"], "export: expected --to DIR"),
 ])
 def test_what_an_option_may_not_be_is_one_sentence(arguments: list[str], said: str) -> None:
     with pytest.raises(BadInput, match=f"^{said}$"):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import fnmatch
 import re
 import shlex
@@ -13,8 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from logger.commands import export as export_command
-from logger.commands import run as run_command
+from logger.commands.main import command
 from logger.installation import PROGRAM, Installation
 from logger.service.config import MACHINE_CONFIG, Config
 from logger.service.main_loop import HANG_US
@@ -104,13 +102,10 @@ def runs_of(program: str) -> list[list[str]]:
 
 
 def test_every_command_line_is_one_that_the_program_takes() -> None:
-    modules = {"run": run_command, "export": export_command}
     ours = [line for unit in (SERVICE, EXPORT) for line in map(inner, command_lines(unit)) if line[0] == str(PROGRAM)]
     assert len(ours) == 4
     for line in ours:
-        parser = argparse.ArgumentParser(exit_on_error=False)
-        modules[line[1]].add_arguments(parser)
-        parser.parse_args(line[2:])
+        command(line[1])[0].parse_args(line[2:])
 
 
 def test_no_unit_and_no_rule_runs_a_shell() -> None:

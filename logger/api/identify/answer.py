@@ -19,7 +19,7 @@ from logger.api.drives import Run, read_run, run_on_road
 from logger.api.identify.question import MEASURED, OBSTACLES, SAME, IdentifyQuestion
 from logger.api.lab.bench import slow_words, word_of
 from logger.api.lab.checks import check_channels, check_decay, check_rate, check_roads, moves_freely, of_rates
-from logger.api.question import each, function, paths_of
+from logger.api.shared_fields import each, paths_of
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, check_forces, model_of
 from logger.chart_data import Array, Bars, Chart, Curves, Line
@@ -57,7 +57,9 @@ from logger.lab.likelihood.priors import UNUSUAL_SIGMA
 from logger.lab.readings_fit import ReadingsFit, fit_to_readings
 from logger.left_out import LeftOut, left_out_json, left_out_paragraph
 from logger.profiles.track import Track
+from logger.question import function
 from logger.report.quantities import known as known_number
+from logger.report.quantities import measured, unit_of
 from logger.runs import Run as Record
 from logger.runs import runs_left_out, unknown_past_s, zero_is_known
 from logger.simulation.virtual_drive import SimulatedRuns
@@ -132,6 +134,15 @@ class Identification(CommandResult):
     def charts(self) -> Sequence[Chart]:
         """Of the residuals, and of correlated estimates."""
         return charts(self.fit)
+
+    def next_words(self, question: IdentifyQuestion, written: Mapping[str, Sequence[Path]]) -> str:
+        """What to do with the numbers, or to find what stands between them and their being believed."""
+        vehicles = [path for paths in written.values() for path in paths if path.suffix == ".yaml"]
+        if not self.converged or question.road != MEASURED or not (self.cannot_tell or vehicles):
+            return ""
+        what = "where the model is off" if self.cannot_tell else "what these numbers leave unexplained"
+        car = vehicles[0] if vehicles else question.vehicle
+        return f"Next, {what}: ridelog compare --vehicle {car} {question.named().replace(', ', ' ')}"
 
     def write(self, path: Path, option: str = "--out") -> None:
         """Write the fitted vehicle, its standard errors as comments."""
@@ -241,8 +252,9 @@ def _on_measured_roads(given: Model, records: list[Record], question: IdentifyQu
     fit = (common := with_common_roughness(model, found.fit)).fit
     low = "" if fit.low_pass.cutoff_hz is None else f", below {fit.low_pass.cutoff_hz:g} Hz"
     lines = [_in_words_of(records, one) for one in measured_lines(fit, *checks)]
-    text = [_head(given, len(fit.free), records, low), *lines, *common_words(model, common),
-            *record_words(found), *left_out_paragraph(_beside_beginnings(records))]
+    text = [*_first_lines(fit, _head(given, len(fit.free), records, low), "rms(measured - model) / rms(measured)"),
+            *lines, *common_words(model, common), *record_words(found),
+            *left_out_paragraph(_beside_beginnings(records))]
     return Identification(
         "\n".join(text), measured_json(fit, *checks) | record_json(found, common, records)
         | left_out_json(runs_left_out(records)), fit, model_of(_fitted(given, model, fit)),
@@ -429,8 +441,9 @@ def _on_unmeasured_roads(given: Model, records: list[Record], question: Identify
     fitted = car.vehicle_with(np.array(list(fit.parameters.values())))
     model = vehicle_file.CarModel(fitted, errors=_road_fit_errors(fit),
                                   given=given.given or given.vehicle, known=given.known)
-    text = [_head(given, len(parameters), records, f"; over {where}", ","), *unmeasured_lines(fit, parameters),
-            *left_out_paragraph(_beside_beginnings(records))]
+    text = [*_first_lines(fit, _head(given, len(parameters), records, f"; over {where}", ","),
+                          "rms(residual) / rms(measured) over the most probable road"),
+            *unmeasured_lines(fit, parameters), *left_out_paragraph(_beside_beginnings(records))]
     return Identification(
         "\n".join(text), {**unmeasured_json(fit, parameters), "runs": [record.name for record in records],
                           **left_out_json(runs_left_out(records))}, fit, model_of(model),
@@ -467,6 +480,8 @@ def _head(given: vehicle_file.CarModel, free: int, records: Sequence[Record], mo
 
 
 NORMAL_95 = 1.959964
+_LINE = 96
+"""Characters of numbers in the first line: it ends within a page of print."""
 _MENTIONED = 0.7
 _DOUBTFUL = 0.1
 
@@ -490,9 +505,8 @@ def measured_json(fit: Fit, white: Test, free_of_road: Test) -> dict[str, Any]:
         "error_before": fit.error_before, "error_after": fit.error_after, "converged": fit.converged,
         "start": {one.name: one.start for one in fit.free},
         "bounds": {one.name: [one.low, one.high] for one in fit.free},
-        "interval_95": {name: list(interval(fit, name)) for name in names},
-        "correlation": {name: dict(zip(names, row, strict=True))
-                        for name, row in zip(names, fit.correlation.tolist(), strict=True)},
+        "interval_95": {one.name: list(interval(fit, one)) for one in fit.free},
+        "correlation": _correlation_json(names, fit),
         "at_bound": fit.at_bound, "iterations": fit.iterations,
         "noise": {"model": fit.noise.name, **fit.noise.levels},
         "residuals_white_p_value": _p_value(white), "residuals_free_of_road_p_value": _p_value(free_of_road),
@@ -529,30 +543,39 @@ def _p_value(test: Test) -> float | None:
     return test.p_value if test.degrees else None
 
 
-def interval(fit: Fit, name: str) -> tuple[float, float]:
+def interval(fit: Fit | RoadFit, one: Free) -> tuple[float, float]:
     """The 95 % interval of an estimate; of a size in the logarithm, so that it stays above 0."""
-    value, error = fit.parameters[name], fit.standard_errors[name]
-    if next(one for one in fit.free if one.name == name).by_factors:
+    value, error = fit.parameters[one.name], fit.standard_errors[one.name]
+    if one.by_factors:
         factor = float(np.exp(NORMAL_95 * error / value))
         return value / factor, value * factor
     return value - NORMAL_95 * error, value + NORMAL_95 * error
 
 
-def measured_lines(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
-    """What a person reads."""
-    steps = f"{fit.iterations} steps"
-    yield (f"Converged in {steps}." if fit.converged else
-           f"NOT CONVERGED in {steps}: do not use these values; start nearer (--start), or free fewer parameters.")
-    if len(fit.ends) > 1:
-        yield _ends(fit)
-    yield (f"NRMSE, rms(measured - model) / rms(measured): {fit.error_before:.4f} before, "
+def _first_lines(fit: Fit | RoadFit, head: str, error: str) -> Iterator[str]:
+    """The answer: the numbers with their standard errors, as many as a line holds, or that there are none to be used;
+    then what they are from, how the fit ended and how far it explains the runs."""
+    said = [f"{name} {measured(value, fit.standard_errors[name])} {unit_of(name)}".rstrip()
+            + " (at its bound)" * (name in fit.at_bound) for name, value in fit.parameters.items()]
+    held = max((count for count in range(1, len(said) + 1) if len(", ".join(said[:count])) <= _LINE), default=1)
+    yield (f"{', '.join(said[:held])}{f', and {len(said) - held} more below' * (held < len(said))}" if fit.converged
+           else f"NOT CONVERGED in {fit.iterations} steps: do not use these values; start nearer (--start), or free "
+                "fewer parameters.")
+    yield head
+    yield (f"{f'Converged in {fit.iterations} steps. ' * fit.converged}NRMSE, {error}: {fit.error_before:.4f} before, "
            f"{fit.error_after:.4f} after.")
+    if isinstance(fit, Fit) and len(fit.ends) > 1:
+        yield _ends(fit)
+
+
+def measured_lines(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
+    """What a person reads of a fit over roads that are known."""
     yield ""
-    yield from _table(fit)
+    yield from _table(fit, fit.free)
     yield ""
     yield from _far_from_file(fit)
     yield f"The residual is modelled as {fit.noise.words}."
-    yield from _measured_correlations(fit)
+    yield from _correlated(list(fit.parameters), fit)
     yield from _checks(white, free_of_road)
     yield from _measured_limits(fit, sound=not any(doubts(fit, white, free_of_road)))
 
@@ -591,28 +614,46 @@ def _ends(fit: Fit) -> str:
     return f"{same} of {len(fit.ends)} starts end at the same place; these are the best values."
 
 
-def _table(fit: Fit) -> Iterator[str]:
-    width = max(len("parameter"), *map(len, fit.parameters))
+def _table(fit: Fit | RoadFit, free: Sequence[Free]) -> Iterator[str]:
+    """The free numbers, then those of roads that were not measured."""
+    roads, road_errors = (fit.roads, fit.road_errors) if isinstance(fit, RoadFit) else ({}, {})
+    width = max(map(len, ["parameter", *fit.parameters, *roads]))
     yield (f"{'parameter':{width}} {'start':>10} {'estimate':>10} {'std. error':>11} {'relative':>9}   "
            f"{'95 % interval':^21}  moved")
-    for one in fit.free:
+    for one in free:
         value, error = fit.parameters[one.name], fit.standard_errors[one.name]
-        low, high = interval(fit, one.name)
+        low, high = interval(fit, one)
         relative = f"{error / abs(value):.2%}" if one.by_factors else "-"
         moved = f"{value / one.start - 1:+.1%}" if one.by_factors else f"{value - one.start:+.3g}"
         mark = "  AT ITS BOUND" if one.name in fit.at_bound else ""
         yield (f"{one.name:{width}} {one.start:10.5g} {value:10.6g} {error:11.3g} {relative:>9}   "
                f"{low:9.5g} to {high:9.5g}  {moved}{mark}")
+    for name, value in roads.items():
+        error = road_errors[name]
+        yield (f"{name:{width}} {'':10} {value:10.4g} {error:11.3g} {'':9}   {value - NORMAL_95 * error:9.5g} to "
+               f"{value + NORMAL_95 * error:9.5g}  {_UNITS.get(name.rpartition('.')[2], '')}")
 
 
-def _measured_correlations(fit: Fit) -> Iterator[str]:
-    names = list(fit.parameters)
-    pairs = [(abs(fit.correlation[i, j]), fit.correlation[i, j], names[i], names[j])
-             for j in range(len(names)) for i in range(j)]
-    large = sorted((pair for pair in pairs if pair[0] > _MENTIONED), reverse=True)
-    if large:
-        yield f"Correlated estimates (correlation beyond {_MENTIONED:g}): " + "; ".join(
-            f"{first} and {second} {value:+.2f}" for _, value, first, second in large) + "."
+def _correlation(fit: Fit | RoadFit) -> Array:
+    deviations = np.sqrt(np.maximum(np.diag(fit.covariance), 1e-300))
+    return np.asarray(fit.covariance / np.outer(deviations, deviations))
+
+
+def _pairs(names: Sequence[str], fit: Fit | RoadFit, between: str) -> list[tuple[str, float]]:
+    """Each two numbers with the correlation of their errors, the most correlated first."""
+    found = _correlation(fit)
+    return sorted(((f"{names[i]}{between}{names[j]}", float(found[i, j]))
+                   for i, j in combinations(range(len(names)), 2)), key=lambda pair: -abs(pair[1]))
+
+
+def _correlation_json(names: Sequence[str], fit: Fit | RoadFit) -> dict[str, dict[str, float]]:
+    return {name: dict(zip(names, row, strict=True))
+            for name, row in zip(names, _correlation(fit).tolist(), strict=True)}
+
+
+def _correlated(names: Sequence[str], fit: Fit | RoadFit) -> Iterator[str]:
+    if large := [f"{both} {value:+.2f}" for both, value in _pairs(names, fit, " and ") if abs(value) > _MENTIONED]:
+        yield f"Correlated estimates (correlation beyond {_MENTIONED:g}): {'; '.join(large)}."
 
 
 def _checks(white: Test, free_of_road: Test) -> Iterator[str]:
@@ -674,45 +715,18 @@ def unmeasured_json(fit: RoadFit, free: Sequence[Free]) -> dict[str, Any]:
         "converged": fit.converged,
         "start": {one.name: one.start for one in free}, "bounds": {one.name: [one.low, one.high] for one in free},
         "road": fit.roads, "road_standard_errors": fit.road_errors,
-        "correlation": {first: {second: float(value) for second, value in zip(fit.names, row, strict=True)}
-                        for first, row in zip(fit.names, _correlation(fit), strict=True)},
+        "correlation": _correlation_json(fit.names, fit),
         "at_bound": fit.at_bound, "iterations": fit.iterations,
         "cannot_tell": [finding.words for finding in fit.verdict],
     }
 
 
 def unmeasured_lines(fit: RoadFit, free: Sequence[Free]) -> Iterator[str]:
-    """What a person reads."""
-    yield (f"Converged in {fit.iterations} steps." if fit.converged else
-           f"NOT CONVERGED in {fit.iterations} steps: do not use these values; start nearer (--start), or free fewer "
-           "parameters.")
-    yield (f"NRMSE over the most probable road, rms(residual) / rms(measured): {fit.error_before:.4f} before, "
-           f"{fit.error_after:.4f} after.")
+    """What a person reads of a fit over roads that were not measured."""
     yield ""
-    width = max(map(len, [*fit.parameters, *fit.roads]))
-    yield f"{'parameter':{width}} {'start':>10} {'estimate':>10} {'std. error':>11}   {'95 % interval':^21}"
-    for one in free:
-        value, error = fit.parameters[one.name], fit.standard_errors[one.name]
-        mark = "  AT ITS BOUND" if one.name in fit.at_bound else ""
-        yield f"{one.name:{width}} {one.start:10.5g} {value:10.6g} {error:11.3g}   {_between(value, error)}{mark}"
-    for name, value in fit.roads.items():
-        error = fit.road_errors[name]
-        unit = _UNITS.get(name.rpartition(".")[2], "")
-        yield f"{name:{width}} {'':10} {value:10.4g} {error:11.3g}   {_between(value, error)}  {unit}"
+    yield from _table(fit, free)
     yield ""
-    yield from _unmeasured_limits(fit, free)
-
-
-def _between(value: float, error: float) -> str:
-    return f"{value - NORMAL_95 * error:9.5g} to {value + NORMAL_95 * error:9.5g}"
-
-
-def _unmeasured_limits(fit: RoadFit, free: Sequence[Free]) -> Iterator[str]:
-    correlation = _correlation(fit)
-    pairs = sorted(((abs(correlation[i, j]), correlation[i, j], fit.names[i], fit.names[j])
-                    for j in range(len(fit.names)) for i in range(j)), reverse=True)
-    if large := [f"{first} and {second} {value:+.2f}" for size, value, first, second in pairs if size > _MENTIONED]:
-        yield f"Correlated estimates (correlation beyond {_MENTIONED:g}): {'; '.join(large)}."
+    yield from _correlated(fit.names, fit)
     for finding in fit.verdict:
         yield f"Cannot tell: {finding.words}"
     sizes = [one.name for one in free if one.by_factors]
@@ -724,19 +738,15 @@ def _unmeasured_limits(fit: RoadFit, free: Sequence[Free]) -> Iterator[str]:
            "bias the estimates. Masses, springs and dampers are known only relative to those that were held fixed.")
 
 
-def _correlation(fit: RoadFit) -> np.ndarray:
-    deviations = np.sqrt(np.maximum(np.diag(fit.covariance), 1e-300))
-    return np.asarray(fit.covariance / np.outer(deviations, deviations))
-
-
 _LAGS, _MOST_PAIRS = 50, 12
 
 
 def charts(fit: Fit | RoadFit) -> list[Chart]:
     """Of a fit on measured roads the residuals' autocorrelation, with the band that chance stays in; of every fit with
     two numbers or more how they hang together."""
-    pairs = _fit_correlations(fit)
-    return [*([_left(fit.white)] if isinstance(fit, Fit) else []), *([pairs] if pairs.bars else [])]
+    names = fit.names if isinstance(fit, RoadFit) else list(fit.parameters)
+    bars = Bars("Correlated estimates", "correlation of their errors", tuple(_pairs(names, fit, ", ")[:_MOST_PAIRS]))
+    return [*([_left(fit.white)] if isinstance(fit, Fit) else []), *([bars] if bars.bars else [])]
 
 
 def _left(white: list[Array]) -> Curves:
@@ -749,12 +759,3 @@ def _left(white: list[Array]) -> Curves:
         Line("residuals", lags.astype(np.float64), found),
         Line("95 % of chance", lags.astype(np.float64), bound, faint=True),
         Line("", lags.astype(np.float64), -bound, faint=True)), (0.0, ""))
-
-
-def _fit_correlations(fit: Fit | RoadFit) -> Bars:
-    names = fit.names if isinstance(fit, RoadFit) else list(fit.parameters)
-    errors = np.sqrt(np.maximum(np.diag(fit.covariance), 1e-300))
-    correlation = fit.covariance / np.outer(errors, errors)
-    pairs = [(f"{names[i]}, {names[j]}", float(correlation[i, j])) for i, j in combinations(range(len(names)), 2)]
-    pairs.sort(key=lambda pair: -abs(pair[1]))
-    return Bars("Correlated estimates", "correlation of their errors", tuple(pairs[:_MOST_PAIRS]))

@@ -6,7 +6,8 @@ from math import isfinite
 from pathlib import Path
 from typing import Annotated
 
-from logger.api import question
+from logger import question
+from logger.api import shared_fields
 
 OBSTACLES = {"bump": ("height_m", "width_m"), "step": ("height_m",)}
 """What lies on a road, and its numbers beside ``start_m``."""
@@ -35,7 +36,7 @@ def _numbers(text: str, count: int) -> tuple[str, list[float]]:
 
 
 def _obstacle(text: str) -> tuple[str, dict[str, float]]:
-    return question.named_numbers(text, "--obstacle")
+    return shared_fields.named_numbers(text, "--obstacle")
 
 
 @dataclass(frozen=True)
@@ -85,15 +86,15 @@ class IdentifyQuestion(question.LongQuestion):
     (True, True)
     """
 
-    vehicle: question.VehicleName
-    runs: Annotated[question.Runs, question.Argument(
+    vehicle: shared_fields.VehicleName
+    runs: Annotated[shared_fields.Runs, question.Argument(
         "folder with drive.csv and profile.csv, or of a rig excitation.csv, or a drive.csv; of one sample rate",
         metavar="RUN", read=Path, many=list)]
     free: Annotated[Sequence[str] | None, question.Option(
         "what to find: names as in the vehicle's file, dry_friction.friction_force_n of an effect, bump.height_m, "
         "step.start_m, speed_scale or road.waviness of the road (default: what the vehicle's file calls unknown or not "
         "known exactly, weighed with what it says, and its effects)", metavar="PARAM,...",
-        read=question.names_of)] = None
+        read=shared_fields.names_of)] = None
     _: KW_ONLY
     start: Annotated[Mapping[str, float] | None, question.Option(
         "where to start instead of the vehicle's value; may repeat", metavar="PARAM=VALUE", read=_number,
@@ -110,7 +111,7 @@ class IdentifyQuestion(question.LongQuestion):
     noise: Annotated[str, question.Option(
         "model of the residual: white (output error), ar (innovations form), road (roughness that the profile does "
         "not contain, through the car); auto: the likeliest", choices=question.NOISE_MODELS)] = "auto"
-    low_pass_hz: question.LowPass = None
+    low_pass_hz: shared_fields.LowPass = None
     tries: Annotated[int, question.InPython("number of further starting points, spread around", question.TRIES)] = 0
     road: Annotated[str, question.Switches(
         "measured: with its profile; unmeasured: each run has a road of its own, of the waviness; same: all are over "
@@ -121,7 +122,7 @@ class IdentifyQuestion(question.LongQuestion):
     waviness: Annotated[float | None, question.InPython(
         "of a road that was not measured (default: 2); to find it, add road.waviness to `free`",
         question.WAVINESS)] = None
-    anyway: question.Anyway = False
+    anyway: shared_fields.Anyway = False
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -21,7 +21,7 @@ from logger.api.drives import Run as DrivenRun
 from logger.api.drives import run_on_road
 from logger.api.lab.checks import check_model, check_moves, checked_runs, predicted
 from logger.api.lab.question import LabQuestion
-from logger.api.question import TOLERANCE, UNKNOWN, Notify, Runs, WrongOption, each, silent
+from logger.api.shared_fields import Runs, each
 from logger.api.vehicles import model_of
 from logger.arrays import Array
 from logger.errors import BadInput
@@ -34,6 +34,7 @@ from logger.lab.selection.add_effect import AddedEffects, add
 from logger.lab.selection.candidate_fit import fit_roughly, refine
 from logger.lab.selection.screening import misalignment, screen
 from logger.profiles.excitation import Excitation
+from logger.question import TOLERANCE, UNKNOWN, Notify, WrongOption, silent
 from logger.runs import Run, are_on_rig
 from logger.shipped import vehicle_path
 from logger.simulation.virtual_drive import SEARCH_HZ, SimulatedRuns

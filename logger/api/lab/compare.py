@@ -15,7 +15,7 @@ import numpy as np
 from logger.api.lab import words as lab_words
 from logger.api.lab.bench import Bench, bench_with, slow_words
 from logger.api.lab.question import AddEffectQuestion, CompareQuestion, LabQuestion
-from logger.api.question import function, named_numbers
+from logger.api.shared_fields import named_numbers
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
 from logger.chart_data import Array, Chart, Curves, Line, line
@@ -31,6 +31,7 @@ from logger.lab.selection.add_effect import BIAS_SIGMA, AddedEffects, Number
 from logger.lab.selection.add_effect import Number as ShiftedNumber
 from logger.lab.selection.holdout import JUDGED_ON, fit_percent
 from logger.left_out import left_out_json, left_out_paragraph
+from logger.question import function
 from logger.report import document as doc
 from logger.report.charts import chart
 from logger.report.quantities import chance, columns, finite, known, numbers_of, signal_errors, unit_of, wrapped

@@ -32,7 +32,7 @@ from logger.api.lab.words import (
     steps_table,
 )
 from logger.api.lab.words import looks_like as residual_looks_like
-from logger.api.question import Notify, Runs, each, function, silent
+from logger.api.shared_fields import Runs, each
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
 from logger.chart_data import Array, Bars, Curves, Line
@@ -51,6 +51,7 @@ from logger.lab.unknown_road.one_road import placed_by_road
 from logger.left_out import left_out_json, left_out_paragraph
 from logger.printable import percent
 from logger.profiles.track import Track
+from logger.question import Notify, function, silent
 from logger.report import document as doc
 from logger.report.charts import chart
 from logger.report.quantities import (

@@ -15,7 +15,6 @@ from logger.api.lab.bench import Bench, bench_with
 from logger.api.lab.diagnose import looks_like, shape_sections
 from logger.api.lab.question import LearnQuestion
 from logger.api.lab.words import error_words, errors_json, falling, removed_json, removed_words
-from logger.api.question import Notify, function, silent
 from logger.api.shown import CommandResult
 from logger.chart_data import Chart, Curves
 from logger.files import write_text
@@ -28,6 +27,7 @@ from logger.lab.laws.refusals import Nearest, Refusal
 from logger.lab.selection.add_effect import AddedEffects, add
 from logger.lab.selection.holdout import JUDGED_ON, ErrorStep
 from logger.plugins import catalogue
+from logger.question import Notify, function, silent
 from logger.report.charts import chart
 from logger.report.document import EMPTY, Html, document, grid, heading, hint, paragraphs, section, tiles
 from logger.report.quantities import finite, measured, numbers_of, unit_of, wrapped

@@ -26,7 +26,6 @@ from logger.api.lab.diagnose import (
 from logger.api.lab.learn import law_lines, law_sections, learned, picture_of, sentences, source_of, why_none, with_law
 from logger.api.lab.question import LabLoopQuestion
 from logger.api.lab.words import falling, steps_table
-from logger.api.question import Notify, function
 from logger.api.shown import CommandResult, check_out
 from logger.api.vehicles import Model, model_of, read_vehicle
 from logger.chart_data import Array, Curves, Line
@@ -38,6 +37,7 @@ from logger.lab.residuals.breakdown import ModelResiduals, frequencies
 from logger.lab.selection.add_effect import AddedEffects
 from logger.lab.selection.holdout import JUDGED_ON
 from logger.lab.session import LawSearch, Round, Story
+from logger.question import Notify, function
 from logger.report import document as doc
 from logger.report.charts import chart
 from logger.report.maps import MapLine, ways_map

@@ -17,8 +17,8 @@ from logger.api.lab.bench import Bench, among, bench_with, planned_bench, tolera
 from logger.api.lab.checks import LEAST_S
 from logger.api.lab.question import PlanQuestion
 from logger.api.lab.words import not_tried
-from logger.api.question import each, function
 from logger.api.roads import read_profile
+from logger.api.shared_fields import each
 from logger.api.shown import CommandResult
 from logger.api.vehicles import model_of
 from logger.chart_data import Array
@@ -30,6 +30,7 @@ from logger.lab.planning.plan import plan as planned_by_lab
 from logger.lab.planning.planned_drive import DriveOption, PlannedCar, SensorNoise, at_speed
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.profiles.track import Track
+from logger.question import function
 from logger.report import document as doc
 from logger.report.quantities import columns, wrapped
 from logger.runs import Run

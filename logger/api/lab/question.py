@@ -6,7 +6,8 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Union
 
-from logger.api import question
+from logger import question
+from logger.api import shared_fields
 
 if TYPE_CHECKING:
     from logger.store.formats.profile_file import Wheelpaths
@@ -19,18 +20,18 @@ PAGE = question.Out("write a page with pictures; may repeat", others=("*",), is_
 class LabQuestion(question.LongQuestion):
     """What the lab's verbs have in common; each has a ``vehicle``, ``runs`` and maybe ``effect_files`` as well."""
 
-    tolerance: question.Tolerance = None
-    low_pass_hz: question.LowPass = None
-    anyway: question.Anyway = False
+    tolerance: shared_fields.Tolerance = None
+    low_pass_hz: shared_fields.LowPass = None
+    anyway: shared_fields.Anyway = False
 
     def files_read(self) -> Sequence[Path]:
         given: Any = self
-        return [*super().files_read(), *question.files_of(given.vehicle)]
+        return [*super().files_read(), *shared_fields.files_of(given.vehicle)]
 
     def command(self, words: str) -> str:
         """A command line about the same vehicle and runs."""
         given: Any = self
-        runs = " ".join(map(str, question.paths_of(given.runs)))
+        runs = " ".join(map(str, shared_fields.paths_of(given.runs)))
         return f"ridelog {words.format(f'--vehicle {given.vehicle}')} {runs}"
 
 
@@ -56,8 +57,8 @@ class CompareQuestion(LabQuestion):
     (True, True)
     """
 
-    vehicle: question.VehicleName
-    runs: question.TrackedRuns
+    vehicle: shared_fields.VehicleName
+    runs: shared_fields.TrackedRuns
 
 
 @dataclass(frozen=True)
@@ -87,11 +88,11 @@ class DiagnoseQuestion(LabQuestion):
     ('sensor_gain', 1.1)
     """
 
-    vehicle: question.VehicleName
-    runs: question.TrackedRuns
+    vehicle: shared_fields.VehicleName
+    runs: shared_fields.TrackedRuns
     _: KW_ONLY
-    candidates: question.Candidates = None
-    effect_files: question.EffectFiles = ()
+    candidates: shared_fields.Candidates = None
+    effect_files: shared_fields.EffectFiles = ()
     list_all: Annotated[bool, "the words list all candidates, not the first 8"] = False
     same_road: Annotated[bool, question.Option(
         "without a profile: two runs or more (folders, or drive.csv files) over one road at different speeds; "
@@ -125,8 +126,8 @@ class AddEffectQuestion(LabQuestion):
     name: Annotated[Path | str, question.Argument(
         "an effect that comes with ridelog, or the path of the Python file of one of your own",
         metavar="NAME[:PARAM=VALUE,...][+NAME...]", read=str)]
-    vehicle: question.VehicleName
-    runs: question.TrackedRuns
+    vehicle: shared_fields.VehicleName
+    runs: shared_fields.TrackedRuns
     _: KW_ONLY
     start: Annotated[Mapping[str, float] | None,
                      "numbers by name, where the fit begins; of several effects each takes its own"] = None
@@ -138,7 +139,7 @@ class AddEffectQuestion(LabQuestion):
 
     def files_read(self) -> Sequence[Path]:
         own = [Path(one.partition(":")[0]) for one in self.names]
-        read = [one for one in super().files_read() if one not in question.files_of(self.vehicle)[:1]]
+        read = [one for one in super().files_read() if one not in shared_fields.files_of(self.vehicle)[:1]]
         return [*read, *(one for one in own if one.is_file())]
 
 
@@ -163,10 +164,10 @@ class LearnQuestion(LabQuestion):
     True
     """
 
-    vehicle: question.VehicleName
-    runs: question.TrackedRuns
+    vehicle: shared_fields.VehicleName
+    runs: shared_fields.TrackedRuns
     _: KW_ONLY
-    effect_files: question.EffectFiles = ()
+    effect_files: shared_fields.EffectFiles = ()
 
     def check_written(self, files: Mapping[str, Sequence[Path]]) -> None:
         """A page alone would lose the law."""
@@ -199,8 +200,8 @@ class PlanQuestion(LabQuestion):
     True
     """
 
-    vehicle: question.VehicleName
-    runs: Annotated[question.Runs, question.Argument(
+    vehicle: shared_fields.VehicleName
+    runs: Annotated[shared_fields.Runs, question.Argument(
         "folder with drive.csv and profile.csv, or of a rig excitation.csv", metavar="RUN", read=Path, many=list)] = ()
     _: KW_ONLY
     profile: Annotated[Union["Wheelpaths", Path, str, None], question.Option(
@@ -214,8 +215,8 @@ class PlanQuestion(LabQuestion):
         "MPS2")] = None
     step_mps2: Annotated[float, question.Option(
         "the planned sensor gives whole multiples of this only [m/s2]", question.ADDED, "MPS2")] = 0.0
-    candidates: question.Candidates = None
-    effect_files: question.EffectFiles = ()
+    candidates: shared_fields.Candidates = None
+    effect_files: shared_fields.EffectFiles = ()
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -247,16 +248,16 @@ class LabLoopQuestion(LabQuestion):
     ['sensor_gain']
     """
 
-    vehicle: question.VehicleName
-    runs: question.TrackedRuns
+    vehicle: shared_fields.VehicleName
+    runs: shared_fields.TrackedRuns
     out: Annotated[Path | str, question.Option(
         "folder for the vehicle files and the page", metavar="DIR", read=Path)] = Path("ridelog-lab")
     _: KW_ONLY
     ask: Annotated[Callable[[str], str | None],
                    "given the name of an effect that was found missing, gives that of the one to be added, or None for "
                    "none; without it all that is missing is added"] = str
-    candidates: question.Candidates = None
-    effect_files: question.EffectFiles = ()
+    candidates: shared_fields.Candidates = None
+    effect_files: shared_fields.EffectFiles = ()
     learns: Annotated[bool, "whether a law is learned at all"] = True
 
 

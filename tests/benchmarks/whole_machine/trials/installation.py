@@ -67,7 +67,7 @@ def upgrade_and_uninstall(bench: Bench, report: Report) -> None:
         sessions = car.guest.must("ls /var/lib/ridelog/*.csv* | sed 's|.*/||; s/-.*//' | sort -u").split()
         report.check("it goes on with its logs", len(sessions) >= 2, sessions)
         rc = car.guest.run("systemctl stop ridelog; ridelog verify /var/lib/ridelog", 120)
-        report.check("ridelog verify of the logs of both", rc.rc == 0, rc.out.strip().splitlines()[-1])
+        report.check("ridelog verify of the logs of both", rc.rc == 0, rc.out.splitlines()[0])
         car.guest.must("/opt/ridelog/bin/ridelog uninstall --dry-run && /opt/ridelog/bin/ridelog uninstall", 120)
         left = car.guest.run("ls /etc/systemd/system/ridelog* /etc/udev/rules.d/90-ridelog.rules "
                              "/etc/sysusers.d/ridelog.conf /usr/local/bin/ridelog 2>/dev/null; "

@@ -137,7 +137,7 @@ def logs_after(car: Car, cuts: Cuts) -> dict[str, str]:
     journal = car.guest.run("journalctl -u ridelog -o cat | grep -iE 'problem=[^ ]|traceback|could not be repaired' "
                             "| tail -5").out
     cuts.problems = [line for line in journal.splitlines() if "problem=None" not in line]
-    cuts.verify = " ".join(car.guest.run("ridelog verify /var/lib/ridelog 2>&1 | tail -1; "
+    cuts.verify = " ".join(car.guest.run("ridelog verify /var/lib/ridelog 2>&1 | sed -n 1p; "
                                          "ridelog verify /var/lib/ridelog | grep WRONG | head -3", 300).out.split())
     (car.guest.folder / "journal.txt").write_text(car.guest.run("journalctl -u ridelog -o short", 300).out)
     return {path.name: path.read_text() for path in (car.guest.share / "logs").glob("*.csv*")}

@@ -85,10 +85,10 @@ class Sticks:
         return False
 
     def verify(self, number: int) -> tuple[int, str]:
-        """What ``ridelog verify`` says of a stick that is plugged in: its exit status and its last line."""
+        """What ``ridelog verify`` says of a stick that is plugged in: its exit status and its first line."""
         done = self.car.guest.run(f". /host/in_guest/sticks.sh; look {number} 'ridelog verify . 2>&1'", 300)
         lines = done.out.strip().splitlines()
-        return done.rc, lines[-1] if lines else ""
+        return done.rc, lines[0] if lines else ""
 
     def journal(self) -> str:
         """The last words of the export units."""

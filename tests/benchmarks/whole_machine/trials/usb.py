@@ -78,8 +78,8 @@ class UsbSticks(Sticks):
     def verify_plugged(self) -> tuple[int, str]:
         """What ``ridelog verify`` says of the one stick that is plugged in."""
         done = self.guest.run(f"mkdir -p /mnt/look; mount -o ro /dev/{self.name()} /mnt/look; cd /mnt/look; "
-                              "ridelog verify . 2>&1 | tail -1; rc=${PIPESTATUS[0]}; cd /; umount /mnt/look; exit $rc",
-                              EXPORT_S)
+                              "ridelog verify . 2>&1 | sed -n 1p; rc=${PIPESTATUS[0]}; cd /; umount /mnt/look; "
+                              "exit $rc", EXPORT_S)
         lines = done.out.strip().splitlines()
         return done.rc, lines[-1] if lines else ""
 

@@ -7,10 +7,11 @@ the four came apart. Solution: a frozen dataclass for each verb, whose annotatio
     progress: Annotated[Notify, "called with what is under way: in Python alone"] = silent
 
 The arguments of the command line (``logger.commands.options``), the function in Python (``function``), the checks
-(``Question``) and the reference are read from it. Modules with questions load nothing heavy.
+(``Question``) and the reference are read from it. What it is answered with is an ``Answer``. Modules with questions
+load nothing heavy.
 
 Annotations name classes that are not loaded (``Union["Model", Path, str]``): an object of one is known by the names of
-its class and of those that it inherits from. Ranges, and fields that several verbs share, stand here too.
+its class and of those that it inherits from. Ranges stand here too.
 """
 
 
@@ -18,14 +19,13 @@ import inspect
 import re
 import textwrap
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from dataclasses import MISSING, dataclass, fields
-from math import isfinite
+from copy import deepcopy
+from dataclasses import MISSING, dataclass, field, fields
 from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
 from types import NoneType, UnionType
 from typing import (
-    TYPE_CHECKING,
     Annotated,
     Any,
     ClassVar,
@@ -39,12 +39,7 @@ from typing import (
     get_origin,
 )
 
-from logger.errors import BadInput
-from logger.units import INCH_PER_MILE_M_PER_KM
-
-if TYPE_CHECKING:
-    from logger.store.formats.drive_file import Drive
-    from logger.store.formats.vehicle_file import CarModel
+from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
 
 
 class Range(NamedTuple):
@@ -263,6 +258,12 @@ class Option:
     check: Callable[[Any], object] | None = None
 
 
+def more_than_0(value: float) -> None:
+    """ValueError for a number that is not above 0."""
+    if not value > 0:
+        raise ValueError("expected more than 0")
+
+
 def word_or_number(word: str, within: Range) -> Callable[[str], float | str]:
     """A reader of a terminal's text that is this word or a number; ValueError for another text."""
     def read(text: str) -> float | str:
@@ -291,6 +292,16 @@ class Argument(Option):
 @dataclass(frozen=True)
 class InPython(Option):
     """A field that is asked for in Python alone: the terminal has no option for it."""
+
+
+@dataclass(frozen=True)
+class Hidden(Option):
+    """A field that a unit of systemd passes: help does not show its option."""
+
+
+@dataclass(frozen=True)
+class Several(Option):
+    """A field whose option takes one value or more at once."""
 
 
 @dataclass(frozen=True)
@@ -353,12 +364,12 @@ class Question:
 
     def __post_init__(self) -> None:
         asked = {one.name: one for one in askings(type(self))}
-        for field in fields(self):
-            value, one = getattr(self, field.name), asked.get(field.name)
+        for each in fields(self):
+            value, one = getattr(self, each.name), asked.get(each.name)
             if one is not None:
                 _check(one, value)
-            elif words := fault(field.type, value):
-                raise self.wrong(field.name, words)
+            elif words := fault(each.type, value):
+                raise self.wrong(each.name, words)
 
     def wrong(self, name: str, words: str) -> WrongOption:
         """The complaint about an option; as ``complaint``."""
@@ -493,6 +504,48 @@ def help_of(question: type[Any]) -> str:
 # --- a verb of the command line ---
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class Answer:
+    """What a command says.
+
+    text    the lines that it prints; empty: none
+    """
+
+    text: str
+    _json: dict[str, Any] = field(repr=False)
+
+    def __repr__(self) -> str:
+        return self.text
+
+    @property
+    def exit_status(self) -> int:
+        """That its command leaves with."""
+        return EXIT_DONE
+
+    def as_json(self) -> dict[str, Any]:
+        """The object that the command prints with ``--json``; a copy."""
+        return deepcopy(self._json)
+
+    def remarks(self, written: Mapping[str, Sequence[Path]]) -> Sequence[str]:
+        """What its command says on stderr, a line each; ``written``: the files of the command, by option."""
+        return ()
+
+    def next_words(self, question: Any, written: Mapping[str, Sequence[Path]]) -> str:
+        """What its command says last, such as what to do next; ``written``: the files of the command, by option."""
+        return ""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Checked(Answer):
+    """The answer of a command that checks something; ``ok``: nothing is wrong."""
+
+    ok: bool = True
+
+    @property
+    def exit_status(self) -> int:
+        return EXIT_DONE if self.ok else EXIT_CHECK_FAILED
+
+
 @dataclass(frozen=True)
 class Out:
     """Files that a verb writes where its command line asks for them: pages and pictures, and those ``of`` another kind
@@ -523,12 +576,14 @@ class Verb:
     answers     module and name of what answers it: ``logger.api.lab.compare:compared``
     outs        what it writes
     refusal     module and name of what makes a program's object of a ``CheckFailed``; empty: it is a complaint
+    has_json    whether its answer can be asked for as one object
     """
 
     question: type[Question]
     answers: str
     outs: Sequence[Out] = ()
     refusal: str = ""
+    has_json: bool = True
 
 
 @dataclass(frozen=True)
@@ -537,106 +592,3 @@ class Verbs:
 
     words: str
     below: Mapping[str, tuple[Verb, str]]
-
-
-Vehicle = Union["CarModel", Path, str]
-"""A model, or the name or file of one."""
-Runs = Union["Drive", Path, str, Sequence[Union["Drive", Path, str]]]
-"""One run or several: records (``ridelog.Run``), or their folders."""
-
-VehicleName = Annotated[Vehicle, Option(
-    "a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name); in Python a model as well",
-    metavar="NAME|FILE", read=str)]
-Anyway = Annotated[bool, Option("go on although a run seems to be of another road or car, or in other units")]
-TrackedRuns = Annotated[Runs, Argument(
-    "folder with drive.csv and profile.csv, or of a rig excitation.csv", metavar="RUN", read=Path, many=list)]
-Tolerance = Annotated[float | str | None, Option(
-    "how well the vehicle's masses, springs and dampers are known where its file does not say: one standard "
-    f"deviation, as a share (default: {USUAL_TOLERANCE:g}; of lengths 0.02). {UNKNOWN}: nothing is known of any",
-    metavar=f"SHARE|{UNKNOWN}", read=word_or_number(UNKNOWN, TOLERANCE),
-    check=check_word_or_number(UNKNOWN, TOLERANCE))]
-Candidates = Annotated[Collection[str] | None, "names of the effects to be tried; None: all"]
-LowPass = Annotated[float | None, Option(
-    "leave out frequencies above it, for example 20, in the record and in the model; errors are of the rest (default: "
-    "all that the record holds; a record that somebody has low-passed is recognised, and said)", metavar="HZ")]
-EffectFiles = Annotated[Sequence[Path | str], Option(
-    "a Python file with an effect of your own, to be tried as well; may repeat. Or the name of an effect of ridelog "
-    "that it tries elsewhere only, such as play",
-    metavar="FILE.py", read=Path, many=list, flag="--effect-file")]
-
-
-def limit_of(text: str) -> float:
-    """An IRI in m/km, of one with in/mi or m/km written behind it, or nothing."""
-    value, is_us = text.strip().removesuffix("in/mi").removesuffix("m/km"), text.strip().endswith("in/mi")
-    try:
-        return float(value) * (INCH_PER_MILE_M_PER_KM if is_us else 1.0)
-    except ValueError:
-        raise ValueError("expected a number, as 2.5 (m/km) or 160in/mi") from None
-
-
-Localized = Annotated[float | None, Option(
-    "list areas of localized roughness (AASHTO R 54): where the IRI over a sliding base of 25 ft exceeds this, in "
-    "m/km, or at a terminal as 160in/mi", LIMIT, "IRI", read=limit_of)]
-Unit = Annotated[str | None, Option(
-    "unit of the accelerations (default: m/s2; a record that is plainly in g is then refused)",
-    choices=("mps2", "g"))]
-
-
-def _rate_hz(text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise ValueError("expected a rate in Hz; a file goes before --resample") from None
-
-
-ResampleHz = Annotated[float | None, Option(
-    "for a record with uneven times, bursts or repeated samples: drop the repeats and resample it evenly at HZ, "
-    "through an anti-alias filter. Without HZ (in Python 0): at its own rate, 100 Hz at least. The result says so",
-    metavar="HZ", read=_rate_hz, bare=0.0)]
-ResampleM = Annotated[float | None, Option(
-    "for an unevenly spaced profile: interpolate it linearly, with a sample every M metres. This changes the IRI, and "
-    "the result says so",
-    metavar="M")]
-
-
-def names_of(text: str) -> list[str]:
-    """Names with commas between them."""
-    return [name.strip() for name in text.split(",") if name.strip()]
-
-
-def each(given: Any) -> list[Any]:
-    """One run or several, as a list."""
-    return list(given) if isinstance(given, Sequence) and not isinstance(given, str) else [given]
-
-
-def paths_of(given: Runs) -> list[Path]:
-    """Those of them that are files or folders."""
-    return [Path(one) for one in each(given) if isinstance(one, str | PathLike)]
-
-
-def named_numbers(text: str, option: str) -> tuple[str, dict[str, float]]:
-    """NAME and its numbers out of ``NAME:PARAM=VALUE,...``."""
-    name, _, rest = text.partition(":")
-    if "=" in name and "/" not in name:
-        raise BadInput(f"{option} {text}: expected NAME:PARAM=VALUE, with a colon after the name")
-    found: dict[str, float] = {}
-    for piece in rest.split(",") if rest else ():
-        parameter, _, value = piece.partition("=")
-        try:
-            found[parameter] = float(value)
-        except ValueError:
-            found[parameter] = float("nan")
-        if not isfinite(found[parameter]):
-            raise BadInput(f"{option} {text}: expected PARAM=NUMBER, found {piece!r}")
-    return name, found
-
-
-def files_of(vehicle: object) -> list[Path]:
-    """The file of a vehicle and those of its own effects; of a model only these. BadInput as ``read_model``."""
-    from logger.shipped import vehicle_path
-    from logger.store.formats.vehicle_file import CarModel, read_model
-
-    if isinstance(vehicle, CarModel):
-        return []
-    path = vehicle_path(str(vehicle))
-    return [path, *(Path(one.file) for one in read_model(path).effects if one.file is not None)]
