@@ -5,7 +5,7 @@ from __future__ import annotations
 import errno
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import ClassVar, NamedTuple
 
 import numpy as np
@@ -51,7 +51,10 @@ class RegisterField:
 
 @dataclass(frozen=True)
 class Register:
-    """A byte register that may be read at any time. ``reset_value`` is what it holds after power-on.
+    """A byte register that may be read at any time, as the data sheet has it.
+
+    reset_value    what it holds after power-on
+    fields         highest and lowest bit of each, both included, by name
 
     Problem: shifts and masks scattered through a driver go wrong silently: a value too large for its field spills
     into the neighbour, a write clears bits that somebody else owns, and some registers change the chip when they are
@@ -65,26 +68,31 @@ class Register:
     name: str
     address: int
     reset_value: int = 0
+    fields: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+
+    def field(self, name: str) -> RegisterField:
+        """The field of that name."""
+        return RegisterField(name, *self.fields[name])
 
     def read(self, bus: I2cBus, chip: int) -> int:
         return bus.read_byte_data(chip, self.address)
 
-    def check(self, bus: I2cBus, chip: int, values: Mapping[RegisterField, int]) -> None:
+    def check(self, bus: I2cBus, chip: int, values: Mapping[str, int]) -> None:
         """Read the register once; BadReply when a field does not hold its value."""
         byte = self.read(bus, chip)
-        for field, value in values.items():
-            if field.extract(byte) != value:
-                raise BadReply(f"register 0x{self.address:02X} ({self.name}) of the chip at 0x{chip:02X}: {field.name} "
-                               f"reads {field.extract(byte)}, expected {value}")
+        for name, value in values.items():
+            if (found := self.field(name).extract(byte)) != value:
+                raise BadReply(f"register 0x{self.address:02X} ({self.name}) of the chip at 0x{chip:02X}: {name} reads "
+                               f"{found}, expected {value}")
 
-    def update(self, bus: I2cBus, chip: int, values: Mapping[RegisterField, int]) -> None:
+    def update(self, bus: I2cBus, chip: int, values: Mapping[str, int]) -> None:
         """Set the fields, leave all other bits as they are, and check that the chip took them.
 
         SettingsError when a value does not fit (nothing is written then), BadReply when it reads back otherwise.
         """
         byte = self.read(bus, chip)
-        for field, value in values.items():
-            byte = field.insert(byte, value)
+        for name, value in values.items():
+            byte = self.field(name).insert(byte, value)
         bus.write_byte_data(chip, self.address, byte)
         self.check(bus, chip, values)
 
@@ -162,7 +170,7 @@ class ConfiguredChip:
     """
 
     def __init__(self, name: str, bus: I2cBus,
-                 settings: Sequence[tuple[Register, Mapping[RegisterField, int]]]) -> None:
+                 settings: Sequence[tuple[Register, Mapping[str, int]]]) -> None:
         self.name = name
         self.registers_to_check = len(settings)
         self._bus = bus
@@ -220,7 +228,7 @@ class BufferedChip(ConfiguredChip, ABC):
     entry_bytes     of one entry, which a read at ``data_address`` takes out of the buffer
     """
 
-    def __init__(self, name: str, bus: I2cBus, settings: Sequence[tuple[Register, Mapping[RegisterField, int]]],
+    def __init__(self, name: str, bus: I2cBus, settings: Sequence[tuple[Register, Mapping[str, int]]],
                  data_address: int, entry_bytes: int) -> None:
         super().__init__(name, bus, settings)
         self._data_address = data_address

@@ -140,28 +140,6 @@ USUAL_BAUD = 9600
 RELEASE_UTC_US = midnight_utc_us(datetime.date(2026, 1, 1))
 
 
-@dataclass(frozen=True)
-class NmeaCounters:
-    """What came in so far.
-
-    sentences       with the right checksum, of any kind
-    bad_checksum    with a wrong or damaged checksum
-    no_checksum     with none
-    malformed       of a kind we read, right checksum, but a field that cannot be
-    ubx_frames      binary frames stepped over
-    dropped_bytes   bytes that belonged to nothing
-    refused_dates   dates of valid fixes that were illegal, too early or too late
-    """
-
-    sentences: int
-    bad_checksum: int
-    no_checksum: int
-    malformed: int
-    ubx_frames: int
-    dropped_bytes: int
-    refused_dates: int
-
-
 @dataclass
 class _Epoch:
     """Sentences of one time, while they come in."""
@@ -186,29 +164,15 @@ class _Epoch:
             return time_us is None or self.time_of_day_us is None or not 0 < ahead_us < DAY_US // 2
         if time_us != self.time_of_day_us:
             return False
-        match sentence:
-            case Rmc():
-                same_kind: Rmc | Gga | Gll | None = self.rmc
-            case Gga():
-                same_kind = self.gga
-            case Gll():
-                same_kind = self.gll
+        same_kind: Rmc | Gga | Gll | None = getattr(self, _place_of(sentence))
         if same_kind is None:
             return True
         return time_us is not None and same_kind.vouches and (type(sentence), talker) not in self.talkers
 
     def add(self, sentence: Rmc | Gga | Gll | Vtg | Gsa) -> None:
-        match sentence:
-            case Rmc():
-                self.rmc = self.rmc or sentence
-            case Gga():
-                self.gga = self.gga or sentence
-            case Gll():
-                self.gll = self.gll or sentence
-            case Vtg():
-                self.vtg = self.vtg or sentence
-            case Gsa():
-                self.gsa = self.gsa or sentence
+        """Of several of a kind the first counts."""
+        place = _place_of(sentence)
+        setattr(self, place, getattr(self, place) or sentence)
 
     def valid(self) -> bool:
         """The validity rule of the module."""
@@ -239,6 +203,11 @@ class _Epoch:
         if self.gga is not None and self.gga.hdop is not None:
             return self.gga.hdop
         return self.gsa.hdop if self.gsa else None
+
+
+def _place_of(sentence: Sentence) -> str:
+    """The name of its kind, under which an epoch has it."""
+    return type(sentence).__name__.lower()
 
 
 SELDOM_US = 5_500_000
@@ -310,11 +279,21 @@ class NmeaDecoder:
                 f"about {_words_of(day + turns * ROLLOVER_DAYS)}, under gps in the settings, or renew its firmware")
 
     @property
-    def counters(self) -> NmeaCounters:
-        return NmeaCounters(sentences=self._checks[Checksum.GOOD], bad_checksum=self._checks[Checksum.BAD],
-                            no_checksum=self._checks[Checksum.MISSING], malformed=self._malformed,
-                            ubx_frames=self._framer.ubx_frames, dropped_bytes=self._framer.dropped_bytes,
-                            refused_dates=self._refused_dates)
+    def counts(self) -> dict[str, int]:
+        """What came in so far.
+
+        sentences       with the right checksum, of any kind
+        bad_checksum    with a wrong or damaged checksum
+        no_checksum     with none
+        malformed       of a kind we read, right checksum, but a field that cannot be
+        ubx_frames      binary frames stepped over
+        dropped_bytes   bytes that belonged to nothing
+        refused_dates   dates of valid fixes that were illegal, too early or too late
+        """
+        return {"sentences": self._checks[Checksum.GOOD], "bad_checksum": self._checks[Checksum.BAD],
+                "no_checksum": self._checks[Checksum.MISSING], "malformed": self._malformed,
+                "ubx_frames": self._framer.ubx_frames, "dropped_bytes": self._framer.dropped_bytes,
+                "refused_dates": self._refused_dates}
 
     def feed(self, t_us: int, data: bytes) -> list[Fix]:
         """Take the bytes that arrived at ``t_us`` [us, monotonic]; return the fixes that are complete."""

@@ -347,14 +347,17 @@ class SampleClock:
         lost, and 120 Hz through an adapter with a timer of 8 ms, arrive alike: the rows of both are flagged.)"""
         if not self.SLOWEST * self._nominal_us <= slope_us <= self._nominal_us / self.SLOWEST**2:
             return None  # of a faster sensor with its lines lost at random, all would be found, too many to date any
+        period_us = self._sampled_us(points, slope_us)
+        return None if period_us is None or period_us > self._nominal_us / self.SLOWEST else period_us
+
+    def _sampled_us(self, points: list[_Point], slope_us: float) -> float | None:
+        """The period [us] by the comb of the arrivals; None where they lie on a line, or show none."""
+        above_us = [point.arrival_us - slope_us * point.number for point in points]
+        if max(above_us) - min(above_us) < 0.5 * slope_us:  # where a sample is lost, they leave it by a period
+            return None
         instants_us = np.array([point.arrival_us for point in points], dtype=np.float64)
         count = points[-1].number - points[0].number
-        if _are_on_a_line(points, slope_us):
-            return None
-        period_us = sampling_period(instants_us, count, slope_us, self.LASTING_US, 1 - self.SLOWEST)
-        if period_us is None or period_us > self._nominal_us / self.SLOWEST:
-            return None
-        return period_us
+        return sampling_period(instants_us, count, slope_us, self.LASTING_US, 1 - self.SLOWEST)
 
     def _are_losses_hidden(self, slope_us: float) -> bool:
         """Whether the comb of the arrivals shows that a sensor faster than the profile's loses more samples than were
@@ -364,14 +367,11 @@ class SampleClock:
         points, slowest_us = self._pieces, self.SLOWEST * self._nominal_us
         if len(points) < self.BLOCKS_SEEN * self.PIECES or not self._nominal_us / self.FASTEST <= slope_us < slowest_us:
             return False
-        if _are_on_a_line(points, slope_us):
-            return False
-        instants_us = np.array([point.arrival_us for point in points], dtype=np.float64)
-        count = points[-1].number - points[0].number
-        period_us = sampling_period(instants_us, count, slope_us, self.LASTING_US, 1 - self.SLOWEST)
+        period_us = self._sampled_us(points, slope_us)
         if period_us is None:
             return False
-        hidden = 1 - period_us / slope_us - (points[-1].lost - points[0].lost) / max(count, 1)
+        first, last = points[0], points[-1]
+        hidden = 1 - period_us / slope_us - (last.lost - first.lost) / max(last.number - first.number, 1)
         return hidden * period_us > (self.HIDDEN_US / 2 if self._hides_losses else self.HIDDEN_US)
 
     def _take_period(self, period_us: float) -> None:
@@ -512,12 +512,6 @@ class SampleClock:
         times: Times = np.maximum.accumulate(np.maximum(whole, self._last_us + 1)) + steps
         self._last_us = int(times[-1])
         return times
-
-
-def _are_on_a_line(points: list[_Point], slope_us: float) -> bool:
-    """Where a sample is lost, they leave it by a period."""
-    above_us = [point.arrival_us - slope_us * point.number for point in points]
-    return max(above_us) - min(above_us) < 0.5 * slope_us
 
 
 def _slope(points: list[_Point], with_lost: bool) -> tuple[float, float]:

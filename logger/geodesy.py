@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from math import cos, hypot, radians
+from typing import Protocol
 
 EARTH_RADIUS_M = 6_371_008.8
 """Mean radius of the Earth, (2 a + b) / 3 of its ellipsoid (IUGG; H. Moritz, Geodetic Reference System 1980)."""
@@ -17,6 +18,23 @@ def ground_distance_m(lat0_deg: float, lon0_deg: float, lat1_deg: float, lon1_de
     """Distance of two near places [m]."""
     east_rad = radians(east_deg(lon0_deg, lon1_deg)) * cos(radians(lat0_deg))
     return EARTH_RADIUS_M * hypot(radians(lat1_deg - lat0_deg), east_rad)
+
+
+class Placed(Protocol):
+    """Something with a position, or None for it [degrees]."""
+
+    @property
+    def lat_deg(self) -> float | None: ...
+
+    @property
+    def lon_deg(self) -> float | None: ...
+
+
+def apart_m(one: Placed, other: Placed) -> float | None:
+    """Distance on the ground between two places some kilometres apart at most [m]; None when one has no position."""
+    if one.lat_deg is None or one.lon_deg is None or other.lat_deg is None or other.lon_deg is None:
+        return None
+    return ground_distance_m(one.lat_deg, one.lon_deg, other.lat_deg, other.lon_deg)
 
 
 def east_and_north_m(lat_deg: float, lon_deg: float, lat0_deg: float, lon0_deg: float) -> tuple[float, float]:

@@ -34,7 +34,6 @@ from drivers.chip_bus import (
     BufferState,
     Entries,
     Register,
-    RegisterField,
     buffered_source,
     bus_fault,
     find_chip,
@@ -46,31 +45,20 @@ from drivers.sources import Source
 
 ADDRESSES = (0x53, 0x1D)
 DEVICE_ID = Register("device id", 0x00, reset_value=0xE5)
-OFFSETS = tuple(Register(f"offset {axis}", address) for axis, address in (("X", 0x1E), ("Y", 0x1F), ("Z", 0x20)))
-RATE = Register("rate", 0x2C, reset_value=0x0A)
-POWER = Register("power control", 0x2D)
-INTERRUPTS = Register("interrupt source", 0x30)
-FORMAT = Register("data format", 0x31)
+OFFSETS = tuple(Register(f"offset {axis}", address, 0x00, {"offset": (7, 0)})
+                for axis, address in (("X", 0x1E), ("Y", 0x1F), ("Z", 0x20)))
+RATE = Register("rate", 0x2C, 0x0A, {"LOW_POWER": (4, 4), "rate code": (3, 0)})
+POWER = Register("power control", 0x2D, 0x00,
+                 {"link, AUTO_SLEEP": (5, 4), "measure": (3, 3), "sleep, wakeup": (2, 0)})
+INTERRUPTS = Register("interrupt source", 0x30, 0x00, {"overrun": (0, 0)})
+FORMAT = Register("data format", 0x31, 0x00,
+                  {"SELF_TEST": (7, 7), "FULL_RES": (3, 3), "justify": (2, 2), "range": (1, 0)})
 DATA_ADDRESS = 0x32
-FIFO = Register("FIFO control", 0x38)
-FIFO_STATUS = Register("FIFO status", 0x39)
-
-WHOLE_BYTE = RegisterField("offset", 7, 0)
-LOW_POWER = RegisterField("LOW_POWER", 4, 4)
-RATE_CODE = RegisterField("rate code", 3, 0)
-LINK_AND_SLEEP = RegisterField("link, AUTO_SLEEP", 5, 4)
-MEASURE = RegisterField("measure", 3, 3)
-SLEEP = RegisterField("sleep, wakeup", 2, 0)
-SELF_TEST = RegisterField("SELF_TEST", 7, 7)
-FULL_RESOLUTION = RegisterField("FULL_RES", 3, 3)
-JUSTIFY = RegisterField("justify", 2, 2)
-RANGE_CODE = RegisterField("range", 1, 0)
-FIFO_MODE = RegisterField("FIFO mode", 7, 6)
-ENTRIES = RegisterField("entries", 5, 0)
-OVERRUN = RegisterField("overrun", 0, 0)
+FIFO = Register("FIFO control", 0x38, 0x00, {"FIFO mode": (7, 6)})
+FIFO_STATUS = Register("FIFO status", 0x39, 0x00, {"entries": (5, 0)})
+OVERRUN, ENTRIES = INTERRUPTS.field("overrun"), FIFO_STATUS.field("entries")
 
 BYPASS, STREAM = 0, 2
-SIXTEEN_G = 3
 RATE_CODES = {200: 0x0B, 400: 0x0C, 800: 0x0D}  # [Hz]; at 100 what is above 50 Hz would fold into the pass band
 FIFO_ENTRIES = 32
 ENTRY_BYTES = 6
@@ -101,10 +89,10 @@ class Adxl345(BufferedChip):
 
     def __init__(self, bus: I2cBus, rate_hz: int, sleep: Callable[[float], None]) -> None:
         super().__init__("ADXL345", bus, (
-            (FORMAT, {FULL_RESOLUTION: 1, RANGE_CODE: SIXTEEN_G, JUSTIFY: 0, SELF_TEST: 0}),
-            (RATE, {RATE_CODE: RATE_CODES[rate_hz], LOW_POWER: 0}),
-            (FIFO, {FIFO_MODE: STREAM}),
-            (POWER, {MEASURE: 1, SLEEP: 0, LINK_AND_SLEEP: 0}),
+            (FORMAT, {"FULL_RES": 1, "range": 3, "justify": 0, "SELF_TEST": 0}),  # 16 g
+            (RATE, {"rate code": RATE_CODES[rate_hz], "LOW_POWER": 0}),
+            (FIFO, {"FIFO mode": STREAM}),
+            (POWER, {"measure": 1, "sleep, wakeup": 0, "link, AUTO_SLEEP": 0}),
         ), DATA_ADDRESS, ENTRY_BYTES)
         self._sleep = sleep
         self._rate_hz = rate_hz
@@ -115,10 +103,10 @@ class Adxl345(BufferedChip):
         self._lost = True
         chip = find_chip(self._bus, DEVICE_ID, ADDRESSES, "an ADXL345")
         try:
-            POWER.update(self._bus, chip, {MEASURE: 0})
+            POWER.update(self._bus, chip, {"measure": 0})
             for offset in OFFSETS:
-                offset.update(self._bus, chip, {WHOLE_BYTE: 0})
-            FIFO.update(self._bus, chip, {FIFO_MODE: BYPASS})  # empties the buffer
+                offset.update(self._bus, chip, {"offset": 0})
+            FIFO.update(self._bus, chip, {"FIFO mode": BYPASS})  # empties the buffer
             self._write_settings(chip)
         except OSError as error:
             raise bus_fault(error, chip) from error
@@ -140,7 +128,7 @@ class Adxl345(BufferedChip):
         chip, self._chip = self._chip, None
         if chip is not None:
             with suppress(OSError, DeviceError):
-                POWER.update(self._bus, chip, {MEASURE: 0})
+                POWER.update(self._bus, chip, {"measure": 0})
 
 
 class Adxl345Decoder(BufferedDecoder):

@@ -32,7 +32,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.accelerometers.accelerometer import Accelerometer, OtherSettings, ReadingQuality, setting
-from drivers.chip_bus import ConfiguredChip, Register, RegisterField, ToggleRegister, bus_fault, find_chip
+from drivers.chip_bus import ConfiguredChip, Register, ToggleRegister, bus_fault, find_chip
 from drivers.errors import BadReply, DeviceError, SettingsError
 from drivers.hardware import I2cBus, Machine
 from drivers.readings import (
@@ -51,27 +51,18 @@ from drivers.sources import ChipSource, Deadlines, Source
 if TYPE_CHECKING:
     from drivers.plain_yaml import Node
 
+ADDRESSES = (0x0A, 0x0B)
 CHIP_ID = Register("chip id", 0x00, reset_value=0xDD)
 REVISION = Register("revision", 0x02)
 DATA_ADDRESS = 0x04  # X, Y, Z: three registers in one burst, which steps from register to register by itself
 SAMPLE_BYTES = 3
 REGISTER_STEP = 2  # from one register's address to the next one's
-AXES = Register("power and axes", 0x1E, reset_value=0x07)
-FILTER = Register("filter", 0x20)
-RANGE = Register("range", 0x22)
-WATCHDOG = Register("bus watchdog", 0x2E)
+AXES = Register("power and axes", 0x1E, 0x07, {"sleep_en": (6, 6), "en_x, en_y, en_z": (2, 0)})
+FILTER = Register("filter", 0x20, 0x00, {"serial_high_bw": (7, 7), "filter code": (3, 0)})
+RANGE = Register("range", 0x22, 0x00, {"sbist": (3, 2), "range code": (1, 0)})
+WATCHDOG = Register("bus watchdog", 0x2E, 0x00, {"watchdog code": (2, 1)})
 SUSPEND = ToggleRegister("suspend", 0x30)
 SOFT_RESET = ToggleRegister("soft reset", 0x32)
-
-SLEEP_ENABLE = RegisterField("sleep_en", 6, 6)
-ENABLED_AXES = RegisterField("en_x, en_y, en_z", 2, 0)
-SERIAL_HIGH_BANDWIDTH = RegisterField("serial_high_bw", 7, 7)
-FILTER_CODE = RegisterField("filter code", 3, 0)
-SELF_TEST = RegisterField("sbist", 3, 2)
-RANGE_CODE = RegisterField("range code", 1, 0)
-WATCHDOG_CODE = RegisterField("watchdog code", 2, 1)
-
-
 WRITABLE = (AXES, FILTER, RANGE, WATCHDOG)
 
 
@@ -114,7 +105,7 @@ class Bma220Chip:
 
     @property
     def watchdog_on(self) -> bool:
-        return WATCHDOG_CODE.extract(self.registers[WATCHDOG.address]) >= 2
+        return WATCHDOG.field("watchdog code").extract(self.registers[WATCHDOG.address]) >= 2
 
     def read(self, address: int, length: int = 1) -> bytes:
         """``length`` consecutive registers from ``address`` on, whose addresses are two apart."""
@@ -158,45 +149,62 @@ RANGE_CODES = {2: 0, 4: 1, 8: 2, 16: 3}  # [g]
 FILTER_CODES = {1000: 0, 500: 1, 250: 2, 125: 3, 64: 4, 32: 5}  # [Hz]
 BANDWIDTHS_HZ = tuple(sorted(hz for hz in FILTER_CODES if hz <= BASE_RATE_HZ * LARGEST_OVERSAMPLE))
 SETTLING_S = {1000: 0.002, 500: 0.002, 250: 0.003, 125: 0.005, 64: 0.009, 32: 0.017}
-WATCHDOG_CODES = {0: 0, 1: 2, 10: 3}  # [ms]; 0 is off
 TOGGLE_WAIT_S = 0.002
 
 log = logging.getLogger(__name__)
 
 
+_DUMP = "dump:"
+
+
+def _bus(node: Node) -> int | Path:
+    """The number of a bus, or the path of a recorded drive."""
+    text = node.content
+    if isinstance(text, str) and text.startswith(_DUMP):
+        path = node.path(after=_DUMP)
+        if not path.is_file():
+            raise node.wrong("a recorded dump (there is no such file)")
+        return path
+    if not node.plain or not isinstance(text, str) or not text.isdigit():
+        raise node.wrong("the number of an I2C bus from 0 to 255, or dump:FILE")
+    return node.integer(0, 255)
+
+
 @dataclass(frozen=True)
-class Bma220Settings:
+class Bma220Config:
     """What may be chosen. SettingsError on a value the chip does not have.
 
+    i2c_bus        the N of /dev/i2c-N, or the path of a recorded drive
     range_g        full scale: 2, 4, 8 or 16 [g]
     bandwidth_hz   the chip's filter: 32, 64, 125, 250, 500 [Hz], not above the sampling rate (beyond that everything
                    in the pass band would alias); None takes the largest not above 0.64 of half the sampling rate
-    oversample     the sampling rate is 100 Hz times this, 1 to 8
-    addresses      I2C addresses to look at, in this order
-    watchdog_ms    the chip lets go of a stuck bus after this time: 1 or 10 [ms], 0 never
+    oversample     the sampling rate is 100 Hz times this, 1 to 8; None means automatic
     """
 
-    range_g: int = 2
-    bandwidth_hz: int | None = None
-    oversample: int = 1
-    addresses: tuple[int, ...] = (0x0A, 0x0B)
-    watchdog_ms: int = 10
+    i2c_bus: int | Path = setting(1, Special(_bus, ("1", "0")))
+    range_g: int = setting(2, OneOf(tuple(RANGE_CODES)))
+    bandwidth_hz: int | None = setting(None, OrNone("auto", OneOf(BANDWIDTHS_HZ)))
+    oversample: int | None = setting(None, OrNone("auto", Whole(1, LARGEST_OVERSAMPLE)))
 
     def __post_init__(self) -> None:
         _choose("range_g", self.range_g, RANGE_CODES)
-        _choose("watchdog_ms", self.watchdog_ms, WATCHDOG_CODES)
-        _choose("oversample", self.oversample, range(1, LARGEST_OVERSAMPLE + 1))
+        _choose("oversample", self.reads, range(1, LARGEST_OVERSAMPLE + 1))
         if self.bandwidth_hz is not None:
             _choose("bandwidth_hz", self.bandwidth_hz, FILTER_CODES)
             if self.bandwidth_hz > self.rate_hz:
                 raise SettingsError(f"bandwidth_hz {self.bandwidth_hz} is above the sampling rate of {self.rate_hz} "
                                     "Hz: the signal would be mostly aliases; choose a smaller one or leave it out")
-        if not self.addresses or not all(0x08 <= address <= 0x77 for address in self.addresses):
-            raise SettingsError(f"addresses are 7-bit I2C addresses from 0x08 to 0x77, not {self.addresses}")
+
+    @property
+    def reads(self) -> int:
+        """Readings per sample of 100 Hz; of a recorded drive one, unless the settings say how it was read."""
+        if self.oversample is not None:
+            return self.oversample
+        return USUAL_OVERSAMPLE if isinstance(self.i2c_bus, int) else 1
 
     @property
     def rate_hz(self) -> int:
-        return BASE_RATE_HZ * self.oversample
+        return BASE_RATE_HZ * self.reads
 
     @property
     def filter_hz(self) -> int:
@@ -204,15 +212,6 @@ class Bma220Settings:
         if self.bandwidth_hz is not None:
             return self.bandwidth_hz
         return max(hz for hz in FILTER_CODES if hz <= 8 * self.rate_hz // 25)
-
-
-@dataclass(frozen=True)
-class Bma220Identity:
-    """Where the chip answered, the revision it names and the filter it was given."""
-
-    address: int
-    revision: int
-    bandwidth_hz: int
 
 
 class Bma220(ConfiguredChip):
@@ -225,21 +224,21 @@ class Bma220(ConfiguredChip):
     SettingsLost    it did, and no longer does
     """
 
-    def __init__(self, bus: I2cBus, settings: Bma220Settings, sleep: Callable[[float], None]) -> None:
+    def __init__(self, bus: I2cBus, settings: Bma220Config, sleep: Callable[[float], None]) -> None:
         super().__init__("BMA220", bus, (
-            (WATCHDOG, {WATCHDOG_CODE: WATCHDOG_CODES[settings.watchdog_ms]}),
-            (RANGE, {RANGE_CODE: RANGE_CODES[settings.range_g], SELF_TEST: 0}),
-            (FILTER, {FILTER_CODE: FILTER_CODES[settings.filter_hz], SERIAL_HIGH_BANDWIDTH: 0}),
-            (AXES, {ENABLED_AXES: 0b111, SLEEP_ENABLE: 0}),
+            (WATCHDOG, {"watchdog code": 3}),  # the chip lets go of a stuck bus after 10 ms
+            (RANGE, {"range code": RANGE_CODES[settings.range_g], "sbist": 0}),
+            (FILTER, {"filter code": FILTER_CODES[settings.filter_hz], "serial_high_bw": 0}),
+            (AXES, {"en_x, en_y, en_z": 0b111, "sleep_en": 0}),
         ))
-        self._read_block = bus.read_i2c_block_data
         self._settings = settings
         self._sleep = sleep
 
-    def start(self) -> Bma220Identity:
-        """Find the chip, wake it, reset it, set it up, and wait until its filter has settled (about 30 ms)."""
+    def start(self) -> int:
+        """Find the chip, wake it, reset it, set it up, and wait until its filter has settled (about 30 ms). Gives the
+        address that it answers at."""
         self._chip = None
-        chip = find_chip(self._bus, CHIP_ID, self._settings.addresses, "a BMA220")
+        chip = find_chip(self._bus, CHIP_ID, ADDRESSES, "a BMA220")
         try:
             revision = REVISION.read(self._bus, chip)
             self._make_run(SUSPEND, chip)
@@ -250,13 +249,13 @@ class Bma220(ConfiguredChip):
         self._sleep(SETTLING_S[self._settings.filter_hz])
         self._chip = chip
         log.info("BMA220 revision %d runs at 0x%02X, filter %d Hz", revision, chip, self._settings.filter_hz)
-        return Bma220Identity(chip, revision, self._settings.filter_hz)
+        return chip
 
     def read_raw(self) -> bytes:
         """The three data bytes X, Y, Z, read in one burst so that they belong together."""
         chip = self._started()
         try:
-            data = bytes(self._read_block(chip, DATA_ADDRESS, SAMPLE_BYTES))
+            data = bytes(self._bus.read_i2c_block_data(chip, DATA_ADDRESS, SAMPLE_BYTES))
         except OSError as error:
             raise bus_fault(error, chip) from error
         if len(data) != SAMPLE_BYTES:
@@ -353,46 +352,6 @@ def _choose(name: str, value: int, known: Iterable[int]) -> None:
         raise SettingsError(f"{name} is one of {', '.join(map(str, sorted(known)))}, not {value}")
 
 
-_DUMP = "dump:"
-
-
-def _bus(node: Node) -> int | Path:
-    """The number of a bus, or the path of a recorded drive."""
-    text = node.content
-    if isinstance(text, str) and text.startswith(_DUMP):
-        path = node.path(after=_DUMP)
-        if not path.is_file():
-            raise node.wrong("a recorded dump (there is no such file)")
-        return path
-    if not node.plain or not isinstance(text, str) or not text.isdigit():
-        raise node.wrong("the number of an I2C bus from 0 to 255, or dump:FILE")
-    return node.integer(0, 255)
-
-
-@dataclass(frozen=True)
-class Bma220Config:
-    """``i2c_bus`` is the N of /dev/i2c-N, or the path of a recorded drive; None means automatic."""
-
-    i2c_bus: int | Path = setting(1, Special(_bus, ("1", "0")))
-    range_g: int = setting(2, OneOf(tuple(RANGE_CODES)))
-    bandwidth_hz: int | None = setting(None, OrNone("auto", OneOf(BANDWIDTHS_HZ)))
-    oversample: int | None = setting(None, OrNone("auto", Whole(1, LARGEST_OVERSAMPLE)))
-
-    def __post_init__(self) -> None:
-        self.chip  # noqa: B018 - SettingsError for what the chip cannot have
-
-    @property
-    def chip(self) -> Bma220Settings:
-        return Bma220Settings(range_g=self.range_g, bandwidth_hz=self.bandwidth_hz, oversample=self.reads)
-
-    @property
-    def reads(self) -> int:
-        """Readings per sample of 100 Hz; of a recorded drive one, unless the settings say how it was read."""
-        if self.oversample is not None:
-            return self.oversample
-        return USUAL_OVERSAMPLE if isinstance(self.i2c_bus, int) else 1
-
-
 class _Bma220(Accelerometer[Bma220Config]):
     """The BMA220 on an I2C bus, or as a recorded drive that is played in real time."""
 
@@ -405,7 +364,7 @@ class _Bma220(Accelerometer[Bma220Config]):
         return f"/dev/i2c-{settings.i2c_bus}" if isinstance(settings.i2c_bus, int) else str(settings.i2c_bus)
 
     def source(self, settings: Bma220Config, machine: Machine) -> Source:
-        return chip_source(_bus_opener(settings.i2c_bus, machine), settings.chip, machine.now_us, machine.sleep)
+        return chip_source(_bus_opener(settings.i2c_bus, machine), settings, machine.now_us, machine.sleep)
 
     def decoder(self, settings: Bma220Config, upright_axis: int) -> Bma220Decoder:
         return Bma220Decoder(settings.range_g)
@@ -413,7 +372,7 @@ class _Bma220(Accelerometer[Bma220Config]):
     def readings(self, settings: Bma220Config) -> ReadingQuality:
         """Coarse steps. Noise is taken to be white before the chip's filter, of the width that goes with the rate: of
         another one a recording does not say, and it has to give the same rows."""
-        hz, usual_hz = (Bma220Settings(oversample=times).filter_hz for times in (settings.reads, 1))
+        hz, usual_hz = (Bma220Config(oversample=times).filter_hz for times in (settings.reads, 1))
         return ReadingQuality(NOISE_MPS2 * sqrt(hz / usual_hz), mps2_per_count(settings.range_g), settings.reads)
 
     def others(self, settings: Bma220Config) -> OtherSettings:
@@ -429,7 +388,7 @@ class _Bma220(Accelerometer[Bma220Config]):
 
     def facts(self, settings: Bma220Config) -> dict[str, Any]:
         return {"verified": True, "range_g": settings.range_g, "mps2_per_count": mps2_per_count(settings.range_g),
-                "bandwidth_hz": settings.chip.filter_hz, "oversample": settings.reads}
+                "bandwidth_hz": settings.filter_hz, "oversample": settings.reads}
 
     def header(self, settings: Bma220Config) -> dict[str, Any]:
         return {"range_g": settings.range_g, "oversample": settings.reads}
@@ -449,7 +408,7 @@ class _Bma220(Accelerometer[Bma220Config]):
         return "check its four wires (3.3 V, ground, SDA, SCL) and that I2C is on (sudo raspi-config)"
 
 
-def chip_source(open_bus: Callable[[], I2cBus], settings: Bma220Settings, now_us: Callable[[], int],
+def chip_source(open_bus: Callable[[], I2cBus], settings: Bma220Config, now_us: Callable[[], int],
                 sleep: Callable[[float], None]) -> ChipSource:
     """One burst of the chip on that bus per poll, at its sampling rate."""
     pace = Deadlines(US_PER_S // settings.rate_hz, now_us, sleep)

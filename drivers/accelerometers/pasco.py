@@ -121,26 +121,6 @@ def _triple(line: bytes, layout: LineLayout) -> Triple:
     return float(match[1]), float(match[2]), float(match[3])
 
 
-@dataclass(frozen=True)
-class PascoCounters:
-    """What came in so far.
-
-    frames          good ones
-    bad_frames      in their place, but with values or a checksum that cannot be
-    dropped_bytes   bytes that belonged to no frame
-    resyncs         times the sample clock lost the line and had to find it again: samples went missing unseen
-    lost            samples that were noticed to be missing between others
-    undated         samples left out because they came at a rate that cannot be used, or too many were lost among them
-    """
-
-    frames: int
-    bad_frames: int
-    dropped_bytes: int
-    resyncs: int
-    lost: int
-    undated: int
-
-
 class PascoDecoder:
     """Bytes of the device in, blocks of acceleration out, by a profile. Raises nothing, whatever the bytes.
 
@@ -196,15 +176,20 @@ class PascoDecoder:
         return self._recent.advice(SENSOR, f"by the profile {self._profile.name}, {self._profile.layout.words} are")
 
     @property
-    def counters(self) -> PascoCounters:
-        """What came in so far and was taken."""
-        samples, clock = self._samples, self._clock
-        dropped = self._reader.framer.dropped_bytes
-        return PascoCounters(samples.good, samples.bad, dropped, clock.resyncs, clock.lost, samples.undated)
-
-    @property
     def counts(self) -> dict[str, int]:
-        return asdict(self.counters)
+        """What came in so far.
+
+        frames          good ones
+        bad_frames      in their place, but with values or a checksum that cannot be
+        dropped_bytes   bytes that belonged to no frame
+        resyncs         times the sample clock lost the line and had to find it again: samples went missing unseen
+        lost            samples that were noticed to be missing between others
+        undated         samples left out because they came at a rate that cannot be used, or too many were lost among
+                        them
+        """
+        samples, clock = self._samples, self._clock
+        return {"frames": samples.good, "bad_frames": samples.bad, "dropped_bytes": self._reader.framer.dropped_bytes,
+                "resyncs": clock.resyncs, "lost": clock.lost, "undated": samples.undated}
 
     def feed(self, t_us: int, data: bytes) -> None:
         """Take the bytes that arrived at ``t_us`` [us, monotonic]."""

@@ -46,7 +46,7 @@ from logger.shipped import vehicle_names, vehicle_path
 from logger.store.formats import drive_file, vehicle_file
 from logger.store.formats.record_file import TIME, VERTICAL, even_rate_hz
 from logger.store.formats.vehicle_file import CarModel, write_model
-from logger.store.log.log_name import LogName, OwnFile, inside_of
+from logger.store.log.log_name import OwnFile, inside_of, log_name
 from logger.store.log.sidecar import load_sidecar
 from logger.units import MPH_MPS
 from logger.vehicle.named_parameters import changed, read, sized
@@ -191,10 +191,10 @@ def _of_logs(source: drive_file.Drive | Path | str) -> list[_Used] | None:
     if path.is_dir():
         logs = [one for one in sorted(inside_of(path)) if (own := OwnFile.of(one.name)) and own.kind == ".csv"]
     else:
-        logs = [path] if path.exists() and LogName.of(path) else []
+        logs = [path] if path.exists() and log_name(path) else []
     found: dict[tuple[Path, int], _Used] = {}
     for log in logs:  # the last file of a session has what is kept of all of it
-        name = LogName.of(log)
+        name = log_name(log)
         try:
             sidecar = load_sidecar(log)
             content = sidecar.content if sidecar else {}

@@ -178,7 +178,7 @@ def _even(record: Given, name: str, asked: RecordRules) -> EvenRecord:
         found = even_record(record.time_s, {record_file.VERTICAL: record.accel_z_mps2}, {}, name, asked)
         return with_marks(found, record.usable)
     if not isinstance(record, record_file.AccelerationRecord):
-        file, t_s, accel, usable = record_file.read_marked_columns(record)
+        file, t_s, accel, usable = record_file.read_columns(record)
         return with_marks(even_record(t_s, accel, {}, file, asked), usable)
     t_s = record.start_s + np.arange(len(record.accel_z_mps2)) / record.rate_hz
     accel = {f"accel_{axis}_mps2": one for axis, one in record.by_axis.items() if one is not None}

@@ -57,7 +57,9 @@ def replayed(asked: ReplayQuestion) -> Outcome:
     from logger.service.main_loop import Player
     from logger.service.wiring import check_recorded_rate
     from logger.store.log.atomic_file import FolderLock
-    from logger.store.log.log_writer import SegmentLog, next_session, repair
+    from logger.store.log.log_name import next_session
+    from logger.store.log.log_writer import SegmentLog
+    from logger.store.log.recovery import repair
     from logger.store.log.row_format import read_log
 
     dump, out = asked.dump, asked.out

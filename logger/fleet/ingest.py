@@ -27,7 +27,7 @@ from logger.geodesy import EARTH_RADIUS_M
 from logger.printable import cell, word
 from logger.report.summary import NOT_COUNTED
 from logger.roads.sections import WindowErrors, errors_of_means
-from logger.store.log.log_name import LogName
+from logger.store.log.log_name import log_name
 from logger.store.log.row_format import COLUMNS, FLAGS, HEADERS, LATEST_US, scan
 from logger.units import US_PER_S
 
@@ -376,7 +376,7 @@ def sessions_of(logs: Iterable[tuple[Path, int]]) -> list[Session]:
     own, with the number 0."""
     found: dict[tuple[Path, int, int], list[Path]] = defaultdict(list)
     for path, car in logs:
-        name = LogName.of(path)
+        name = log_name(path)
         found[path.parent if name else path, car, name.session if name else 0].append(path)
     return [Session(car, number, tuple(sorted(paths))) for (_, car, number), paths in found.items()]
 

@@ -25,6 +25,7 @@ from logger.arrays import Array, Bools
 from logger.fleet.car_biases import CarBiases, RoadPasses, car_biases
 from logger.fleet.dataset import Engine
 from logger.fleet.road_map import ON_MAP, SEGMENT_M, RoadPieces, block_of, cell_keys, section_of
+from logger.roads.repeated_drives import false_discovery, two_sided
 from logger.roads.sections import FAIR_TO_IN_PER_MI
 from logger.units import INCH_PER_MILE_M_PER_KM, MILE_M
 
@@ -56,11 +57,6 @@ def _passes(rows: ir.Table, since_us: int | None, until_us: int | None) -> ir.Ta
     if since_us is not None:
         passes = passes.filter(passes.utc_us >= since_us)
     return passes if until_us is None else passes.filter(passes.utc_us < until_us)
-
-
-def car_sums(by_car: ir.Table) -> ir.Table:
-    """Passes and roads of each car."""
-    return by_car.group_by("car").aggregate(passes=by_car.passes.sum(), roads=by_car.count())
 
 
 def passes_by_session(rows: ir.Table, since_us: int | None, until_us: int | None, zero_us: int, one_in: int
@@ -161,12 +157,9 @@ def road_figures(sums: Sums, pass_std: float) -> RoadFigures:
 
 def significant(p_value: Array, false_share: float) -> Bools:
     """Which of n tests are significant, with a share of false ones among them of at most so much; NaN is none."""
-    known = np.flatnonzero(np.isfinite(p_value))
-    order = known[np.argsort(p_value[known], kind="stable")]
-    passed = np.flatnonzero(p_value[order] <= false_share * np.arange(1, len(order) + 1) / max(len(order), 1))
+    known = np.isfinite(p_value)
     out = np.zeros(len(p_value), dtype=np.bool_)
-    if len(passed):
-        out[order[: passed[-1] + 1]] = True
+    out[known] = false_discovery(p_value[known]) <= false_share
     return out
 
 
@@ -289,7 +282,7 @@ def summarise(engine: Engine, by: str, since_us: int | None, until_us: int | Non
     """
     by_car = passes_by_car(engine.rows, since_us, until_us, _ZERO_US)
     with engine.kept(by_car) as kept:
-        of_cars = engine.arrays(car_sums(kept))
+        of_cars = engine.arrays(kept.group_by("car").aggregate(passes=kept.passes.sum(), roads=kept.count()))
         order = np.argsort(of_cars["car"])
         cars, car_passes = of_cars["car"][order], of_cars["passes"][order].astype(np.float64)
         if not len(cars):
@@ -418,19 +411,13 @@ def grouped(segments: RoadTable, by: str, pieces: RoadPieces | None, shared: flo
 
     trend, trend_std = mean("trend_m_per_km_per_year"), error_of_mean("trend_std_m_per_km_per_year")
     figures = RoadFigures(mean("iri_m_per_km"), error_of_mean("iri_std_m_per_km"), trend, trend_std,
-                          _normal_p(trend, trend_std))
+                          two_sided(trend / trend_std))
     north = mean("heading_deg", lambda one: np.cos(np.radians(one)))
     east = mean("heading_deg", lambda one: np.sin(np.radians(one)))
     heading_deg = np.where(np.hypot(north, east) > 0.5, np.degrees(np.arctan2(east, north)) % 360.0, np.nan)
     return _table(by, key, mean("lat_deg"), mean("lon_deg"), heading_deg, total(np.ones(len(code))),
                   extreme("cars", np.minimum), mean("passes"), mean("mean_years"), figures,
                   np.sqrt(mean("a_w_mps2", np.square)), mean("speed_mps"), extreme("last_us", np.maximum))
-
-
-def _normal_p(trend: Array, trend_std: Array) -> Array:
-    from scipy.stats import norm
-
-    return np.asarray(2.0 * norm.sf(np.abs(trend) / trend_std))
 
 
 def _table(by: str, key: Keys, lat_deg: Array, lon_deg: Array, heading_deg: Array, length_m: Array, cars: Keys,

@@ -15,9 +15,10 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from logger.comfort.iso2631 import COMFORT_WORDS
+from logger.geodesy import apart_m
 from logger.records import WindowRecord
 from logger.roads.iso8608 import CLASS_GD_N0_CM3, iri_from_gd_n0
-from logger.store.log.log_reader import along_m, apart_m, end_utc_us, iso_utc, length_m, split_drives, utc
+from logger.store.log.log_reader import along_m, end_utc_us, iso_utc, length_m, split_drives, utc
 
 IRI_CLASSES: Mapping[str, str] = {"A": "very good", "B": "good", "C": "average", "D": "poor", "E": "very poor",
                                   "F": "extremely poor", "G": "extremely poor", "H": "extremely poor"}

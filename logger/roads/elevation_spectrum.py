@@ -40,7 +40,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.arrays import Array
-from logger.roads.iri import iri, slope_gain
+from logger.roads.iri import check_spacing, iri, slope_gain
 from logger.roads.iso8608 import (
     CLASS_GD_N0_CM3,
     CM3_M3,
@@ -181,15 +181,13 @@ def classify(elevation_m: npt.ArrayLike, spacing_m: float, widest_step_m: float 
     or without any roughness.
     """
     shortest_m = 100.0
-    coarsest_spacing_m = 0.3
     clear_of_trend = 1.5  # in steps of wave number: the mean slope takes a part of the first one only
     clear_of_aliases = 0.25
     elevation = np.asarray(elevation_m, dtype=float)
     length_m = (elevation.size - 1) * spacing_m
     if length_m < shortest_m * (1 - 1e-9):
         raise ValueError(f"too short to classify: expected at least {shortest_m:g} m, found {length_m:.4g} m")
-    if not 0 < spacing_m <= coarsest_spacing_m * (1 + 1e-9):
-        raise ValueError(f"expected samples at most {coarsest_spacing_m:g} m apart, found {spacing_m:g} m")
+    check_spacing(spacing_m)
     measured_m = max(spacing_m, widest_step_m or 0.0)
     of = spectrum(elevation, spacing_m)
     edges = band_edges(max(LOWEST_CPM, clear_of_trend * of.step_cpm), min(HIGHEST_CPM, clear_of_aliases / measured_m))

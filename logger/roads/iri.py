@@ -32,14 +32,19 @@ TIRE_BASE_M = 0.25
 COARSEST_SPACING_M = 0.3
 
 
+def check_spacing(spacing_m: float) -> None:
+    """ValueError for samples of a profile that lie farther apart than the standards allow [m]."""
+    if not 0 < spacing_m <= COARSEST_SPACING_M * (1 + 1e-9):
+        raise ValueError(f"expected samples at most {COARSEST_SPACING_M:g} m apart, found {spacing_m:g} m")
+
+
 def golden_car_sections(spacing_m: float) -> Array:
     """Second-order sections, (2, 6) rows b0, b1, b2, 1, a1, a2, from road slope to suspension slope [m/m to m/m].
 
     One sample per step of ``spacing_m`` [m] at 80 km/h; the output belongs to the end of the step. Steady slope in,
     nothing out. ValueError unless the spacing is above 0 and at most 300 mm.
     """
-    if not 0 < spacing_m <= COARSEST_SPACING_M * (1 + 1e-9):
-        raise ValueError(f"expected samples at most {COARSEST_SPACING_M:g} m apart, found {spacing_m:g} m")
+    check_spacing(spacing_m)
     poles = np.linalg.eigvals(quarter_car(GOLDEN_CAR).state_space()[0])
     upper = poles[poles.imag > 0]
     stiffness_per_mass = GOLDEN_CAR.front.tire_stiffness_n_per_m / GOLDEN_CAR.front.unsprung_mass_kg

@@ -173,11 +173,16 @@ def variances(passes: Passes, scatter: Scatter) -> Array:
                       + (np.nan_to_num(scatter.drive)**2 + np.nan_to_num(scatter.passes)**2) * level**2)
 
 
-def means(passes: Passes, scatter: Scatter) -> Means:
-    """The mean of the passes over each cell."""
+def _weighted(passes: Passes, scatter: Scatter) -> tuple[npt.NDArray[np.int64], Ints, Array, Array]:
+    """Keys of the cells (k,), the cell and the weight of each pass (p,), and the sums of the weights (k,)."""
     key, cell = np.unique(passes.key, return_inverse=True)
     weight = 1.0 / np.maximum(variances(passes, scatter), 1e-12)
-    total = np.bincount(cell, weight, len(key))
+    return key, cell, weight, np.asarray(np.bincount(cell, weight, len(key)), dtype=np.float64)
+
+
+def means(passes: Passes, scatter: Scatter) -> Means:
+    """The mean of the passes over each cell."""
+    key, cell, weight, total = _weighted(passes, scatter)
     first, last = np.full(len(key), np.inf), np.full(len(key), -np.inf)
     np.fmin.at(first, cell, passes.time_s)
     np.fmax.at(last, cell, passes.time_s)
@@ -221,7 +226,7 @@ def changes(passes: Passes, scatter: Scatter, split_s: float) -> Changes:
     variance = sum(mean.iri_std_m_per_km[rows] ** 2 - mean.common_std_m_per_km[rows] ** 2
                    for mean, rows in ((one, here), (other, there)))
     std = np.sqrt(variance)
-    p_value = _two_sided(change / std)
+    p_value = two_sided(change / std)
     return Changes(key, one.drives[here], other.drives[there], change, std, p_value, false_discovery(p_value))
 
 
@@ -245,16 +250,14 @@ def trends(passes: Passes, scatter: Scatter) -> Trends:
     """A straight line through the passes over each cell."""
     year_s = 365.25 * 86_400.0
     dated = passes.of(np.isfinite(passes.time_s))
-    key, cell = np.unique(dated.key, return_inverse=True)
-    weight = 1.0 / np.maximum(variances(dated, scatter), 1e-12)
-    total = np.bincount(cell, weight, len(key))
+    key, cell, weight, total = _weighted(dated, scatter)
     year = dated.time_s / year_s
     aside = year - (np.bincount(cell, weight * year, len(key)) / total)[cell]
     spread = np.bincount(cell, weight * aside**2, len(key))
     days = spread / np.maximum(total, 1e-300) > (1.0 / 365.25)**2
     slope = np.bincount(cell, weight * aside * dated.iri_m_per_km, len(key))[days] / spread[days]
     std = 1.0 / np.sqrt(spread[days])
-    p_value = _two_sided(slope / std)
+    p_value = two_sided(slope / std)
     drives = np.bincount(cell, minlength=len(key)).astype(np.intp)
     return Trends(key[days], drives[days], slope, std, p_value, false_discovery(p_value))
 
@@ -268,7 +271,8 @@ def false_discovery(p_value: Array) -> Array:
     return found
 
 
-def _two_sided(z: Array) -> Array:
+def two_sided(z: Array) -> Array:
+    """Probability of a normal deviate (n,) as far from 0 either way."""
     from scipy.special import ndtr
 
     return np.asarray(2.0 * ndtr(-np.abs(z)), dtype=np.float64)
@@ -378,8 +382,7 @@ def way_means(passes: Passes, scatter: Scatter, cell_m: float) -> WayMeans:
     if not len(passes.key):
         none = np.zeros(0, np.intp)
         return WayMeans(none, np.zeros(0), none, np.zeros(0), np.zeros(0))
-    _, cell = np.unique(passes.key, return_inverse=True)
-    weight = 1.0 / np.maximum(variances(passes, scatter), 1e-12)
+    _, cell, weight, total = _weighted(passes, scatter)
     length_m = np.zeros(cell.max() + 1)
     np.maximum.at(length_m, cell, np.minimum(passes.known_m, cell_m))
     ways, number = way_and_cell(passes.key)
@@ -387,7 +390,7 @@ def way_means(passes: Passes, scatter: Scatter, cell_m: float) -> WayMeans:
     covered_m = np.zeros(len(way))
     first = np.unique(cell, return_index=True)[1]
     np.add.at(covered_m, of[first], length_m)
-    share = weight / np.bincount(cell, weight)[cell] * length_m[cell] / covered_m[of]
+    share = weight / total[cell] * length_m[cell] / covered_m[of]
     mean: Array = np.asarray(np.bincount(of, share * passes.iri_m_per_km), dtype=np.float64)
     pair, which = np.unique(np.stack([of, passes.drive]), axis=1, return_inverse=True)
     by_drive = np.bincount(which.ravel(), share)

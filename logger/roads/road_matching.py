@@ -21,6 +21,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from math import erfc, exp, inf, log, pi, sqrt
+from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -76,6 +77,15 @@ def on_sphere(lat_deg: Array, lon_deg: Array) -> Array:
     """Places (n,) as points (n, 3) of the sphere [m]."""
     lat, lon = np.radians(lat_deg), np.radians(lon_deg)
     return EARTH_RADIUS_M * np.column_stack([np.cos(lat) * np.cos(lon), np.cos(lat) * np.sin(lon), np.sin(lat)])
+
+
+def _line(lat_deg: Array, lon_deg: Array) -> tuple[Array, Array]:
+    """Corners of a line (n, 3) on the sphere and its length up to each (n,) [m]. ValueError where it has none."""
+    corners = on_sphere(lat_deg, lon_deg)
+    length_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
+    if not length_m[-1] > 0:
+        raise ValueError("expected a line with a length")
+    return corners, length_m
 
 
 def east_and_north(points: Array) -> tuple[Array, Array]:
@@ -188,10 +198,7 @@ class RoadNetwork:
     def add_line(self, lat_deg: Array, lon_deg: Array, measure_m: Array | None = None) -> int:
         """A given line as a way, with its measures at the corners, or from 0 at its beginning; gives its number.
         ValueError for a line without length, or measures that do not grow."""
-        corners = on_sphere(lat_deg, lon_deg)
-        length_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
-        if not length_m[-1] > 0:
-            raise ValueError("expected a line with a length")
+        corners, length_m = _line(lat_deg, lon_deg)
         kept = np.concatenate([[True], np.diff(length_m) > 0])
         measure_m = length_m if measure_m is None else measure_m
         corners, length_m, measure_m = corners[kept], length_m[kept], measure_m[kept]
@@ -360,9 +367,9 @@ def _best_chain(network: RoadNetwork, trace: Trace, receiver: Receiver, start: _
             [_beside(lists, chain, one, number, here, before, drift, receiver) for number, chain in ahead])]
         if not here:
             new = [chain._replace(candidate=NO_WAY, known=False, parent=number, rivals=()) for number, chain in ahead]
-        best = max(map(_score, new))
+        best = max(chain.score for chain in new)
         likely = (chain for chain in new if chain.score > best - _WORST)
-        chains = sorted(likely, key=_score, reverse=True)[:most_chains]
+        chains = sorted(likely, key=attrgetter("score"), reverse=True)[:most_chains]
         history.append(chains)
         before = here
     path, states = _traced_back(history)
@@ -374,7 +381,7 @@ def _distinct(chains: Sequence[_Chain]) -> list[_Chain]:
     them (multiple hypotheses; Reid, "An algorithm for tracking multiple targets", IEEE Trans. Automatic Control 24,
     1979). One that is left out is a rival of the one that it is like."""
     most_each = 3  # of them to one street, by different errors of the receiver
-    ranked = sorted(chains, key=_score, reverse=True)
+    ranked = sorted(chains, key=attrgetter("score"), reverse=True)
     kept: list[_Chain] = []
     rivals: list[list[tuple[int, float]]] = []
     for chain in ranked:
@@ -414,10 +421,6 @@ def _belief(history: Sequence[Sequence[_Chain]], lists: _Lists) -> Array:
                     before[parent] = max(before[parent], total - less)
             totals, best = before, mine.parent
     return found
-
-
-def _score(chain: _Chain) -> float:
-    return chain.score
 
 
 def _on(lists: _Lists, chain: _Chain, one: int, parent: int, here: range, before: range, receiver: Receiver) -> _Chain:
@@ -643,10 +646,7 @@ def measures(lat_deg: Array, lon_deg: Array, begin_m: float | None, end_m: float
     ValueError where the line has no length, or posts do not follow each other along the line by growing measures.
     """
     shortest_m = 1.0  # between posts
-    corners = on_sphere(lat_deg, lon_deg)
-    length_m = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(corners, axis=0), axis=1))])
-    if not length_m[-1] > 0:
-        raise ValueError("expected a line with a length")
+    corners, length_m = _line(lat_deg, lon_deg)
     if posts is None or post_m is None or not len(post_m):
         first = begin_m if begin_m is not None else 0.0 if end_m is None else end_m - length_m[-1]
         last = end_m if end_m is not None else first + length_m[-1]

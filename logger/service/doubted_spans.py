@@ -14,7 +14,7 @@ import numpy.typing as npt
 from drivers.readings import AccelerationBlock, Fix
 from logger.dsp.repeated_samples import LEAST_SHARE, are_fresh, find_repeats, fresh_samples
 from logger.estimation.drive_alignment import DriveAlignment
-from logger.geodesy import ground_distance_m
+from logger.geodesy import apart_m
 from logger.service.timebase import Timebase, TimedFix
 from logger.units import US_PER_S
 
@@ -253,12 +253,12 @@ class SpeedCheck:
             return
         between_s = (timed.t_us - last.t_us) / US_PER_S
         self._since_node_m += 0.5 * (fix.speed_mps + (last.fix.speed_mps or 0.0)) * between_s
-        is_held = _apart_m(last, timed) == 0.0 and fix.speed_mps < HELD_MPS
+        is_held = not apart_m(last.fix, fix) and fix.speed_mps < HELD_MPS
         self._was_held |= is_held
         self._last = timed
         if self._lasts:
             self.spans.end_at(timed.t_us)
-        by_places_m = _apart_m(node, timed)
+        by_places_m = apart_m(node.fix, fix) or 0.0
         if max(self._since_node_m, by_places_m) < STEP_M or is_held:
             return
         if not self._was_held:
@@ -276,7 +276,9 @@ class SpeedCheck:
         lasted_us = timed.t_us - first.t_us
         random_m = sqrt(2 * PLACE_M**2 + SPEED_MPS**2 * lasted_us / US_PER_S)
         limit_m = SHARE * max(by_speed_m, by_places_m) + DEVIATIONS * random_m
-        moves = by_places_m < by_speed_m or self._straight_m() > JUMP_M
+        # From the first places to the last: the shortest, as one of them may be far off.
+        straight_m = min(apart_m(one.fix, other.fix) or 0.0 for one in self._nodes[:2] for other in self._nodes[-2:])
+        moves = by_places_m < by_speed_m or straight_m > JUMP_M
         if moves and abs(by_places_m - by_speed_m) > limit_m:
             if not self._lasts:
                 self.spans.begin(first.t_us, timed.t_us)
@@ -292,10 +294,6 @@ class SpeedCheck:
             self._lasts = self._lasts and not agrees
             self._begin(timed)
 
-    def _straight_m(self) -> float:
-        """From the first places to the last: the shortest, as one of them may be far off."""
-        return min(_apart_m(one, other) for one in self._nodes[:2] for other in self._nodes[-2:])
-
     @property
     def doubt(self) -> str:
         """What is wrong with the receiver, while it lasted until a minute ago; empty: nothing."""
@@ -310,13 +308,6 @@ class SpeedCheck:
         self._was_held = False
         self._steps = []
         self._nodes = [timed]
-
-
-def _apart_m(one: TimedFix, other: TimedFix) -> float:
-    a, b = one.fix, other.fix
-    if a.lat_deg is None or a.lon_deg is None or b.lat_deg is None or b.lon_deg is None:
-        return 0.0
-    return ground_distance_m(a.lat_deg, a.lon_deg, b.lat_deg, b.lon_deg)
 
 
 class JudgedDrive:

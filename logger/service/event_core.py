@@ -18,7 +18,7 @@ from drivers.readings import GPS, AccelerationBlock, Fix
 from logger.records import WindowRecord
 from logger.service.doubted_spans import Repetition, SpeedCheck
 from logger.service.timebase import JUMP_US, Timebase
-from logger.store.log.log_writer import ClockMap
+from logger.store.log.sidecar import ClockMap
 from logger.units import US_PER_S
 
 STEP_US = 500_000

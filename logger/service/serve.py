@@ -11,7 +11,6 @@ import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
@@ -296,7 +295,7 @@ def _serve(config: Config, stop: Stop) -> None:
     accelerometer, gps = (Supervisor(source, monotonic_us) for source in sources)
     listeners = [Listener(part, events, source.rest)
                  for part, source in zip((accelerometer, gps), sources, strict=True)]
-    counters = {"accelerometer": lambda: sensor.decoder.counts, "gps": lambda: asdict(decoder.counters)}
+    counters = {"accelerometer": lambda: sensor.decoder.counts, "gps": lambda: decoder.counts}
     notices = tuple(filter(None, (*wiring.notices(config, model, sensor), memory_notice(config.log.directory))))
     for notice in notices:
         log.warning("%s", notice)

@@ -19,7 +19,9 @@ from logger.store.export.export import exported_names
 from logger.store.export.sticks import NOT_PAIRED, Pairing
 from logger.store.log.atomic_file import names_set_aside
 from logger.store.log.disk_quota import DiskQuota, DumpRecording, QuotaLimits, repair_recordings
-from logger.store.log.log_writer import BufferedLog, SegmentLog, next_session, repair
+from logger.store.log.log_name import next_session
+from logger.store.log.log_writer import BufferedLog, SegmentLog
+from logger.store.log.recovery import repair
 from logger.units import US_PER_S
 
 LOOK_US = 10 * US_PER_S

@@ -12,7 +12,7 @@ A stick that logs were exported to is compared with the manifest that lies besid
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -25,7 +25,7 @@ from logger.records import WindowRecord
 from logger.store.export import manifest
 from logger.store.export.directory_handle import DirectoryHandle
 from logger.store.export.manifest import is_of_export, read_manifest
-from logger.store.log.log_name import LogName, finished_path, inside_of, name_before, open_path
+from logger.store.log.log_name import finished_path, inside_of, log_name, name_before, open_path
 from logger.store.log.log_reader import other_recordings
 from logger.store.log.row_format import Row, scan
 from logger.store.log.sidecar import SETTINGS_LOST, Hole, are_in_holes, load_sidecar, repairs_of
@@ -40,7 +40,7 @@ SHOWN_PROBLEMS = 20  # Most problems that are kept in words for one file; all ar
 _DUMP_START = b"# ridelog-dump "
 
 
-@dataclass(frozen=True)
+@dataclass
 class FileCheck:
     """What was found in one file.
 
@@ -58,45 +58,36 @@ class FileCheck:
     path: Path
     kind: str
     state: str
-    records_good: int
-    records_torn: int
-    records_corrupt: int
-    gaps: int
-    problems: tuple[str, ...]
+    records_good: int = 0
+    records_torn: int = 0
+    records_corrupt: int = 0
+    gaps: int = 0
+    problems: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
 
     @property
     def ok(self) -> bool:
         return not self.problems
 
+    def wrong(self, problem: str) -> None:
+        if len(self.problems) < SHOWN_PROBLEMS:
+            self.problems += (problem,)
+
+    def note(self, words: str) -> None:
+        if len(self.notes) < SHOWN_PROBLEMS:
+            self.notes += (words,)
+
 
 @dataclass
-class _Findings:
-    """What is found in one file, the records at its ends, damaged lines beyond them, holes that a repair left."""
+class _Log:
+    """What is found in one log, the records at its ends, damaged lines beyond them, holes that a repair left."""
 
-    good: int = 0
-    torn: int = 0
-    corrupt: int = 0
-    gaps: int = 0
-    problems: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    check: FileCheck
     first: WindowRecord | None = None
     last: WindowRecord | None = None
     damaged_before_first: int = 0
     damaged_since_last: int = 0
     holes: tuple[Hole, ...] = ()
-
-    def wrong(self, problem: str) -> None:
-        if len(self.problems) < SHOWN_PROBLEMS:
-            self.problems.append(problem)
-
-    def note(self, words: str) -> None:
-        if len(self.notes) < SHOWN_PROBLEMS:
-            self.notes.append(words)
-
-    def check(self, path: Path, kind: str, state: str) -> FileCheck:
-        return FileCheck(path, kind, state, self.good, self.torn, self.corrupt, self.gaps, tuple(self.problems),
-                         tuple(self.notes))
 
 
 def verify(paths: Iterable[Path]) -> list[FileCheck]:
@@ -108,7 +99,7 @@ def verify(paths: Iterable[Path]) -> list[FileCheck]:
     """
     paths = list(paths)
     found = dict.fromkeys(file for path in paths for file in _files_of(path))
-    logs: dict[Path, _Findings] = {}
+    logs: dict[Path, _Log] = {}
     checks: dict[Path, FileCheck] = {}
     for path in found:
         _check(path, logs, checks)
@@ -120,11 +111,11 @@ def verify(paths: Iterable[Path]) -> list[FileCheck]:
     for path in logs.keys() - now.keys():
         del logs[path]
     _compare_neighbours(logs)
-    checks |= {path: logs[path].check(path, "log", "open" if _is_part(path) else "finished") for path in logs}
+    checks |= {path: one.check for path, one in logs.items()}
     return [checks[path] for path in now if path in checks]
 
 
-def _check(path: Path, logs: dict[Path, _Findings], checks: dict[Path, FileCheck]) -> None:
+def _check(path: Path, logs: dict[Path, _Log], checks: dict[Path, FileCheck]) -> None:
     """Check one file; nothing for one that is not there any more."""
     try:
         if path.name == manifest.NAME:
@@ -141,7 +132,7 @@ def _check(path: Path, logs: dict[Path, _Findings], checks: dict[Path, FileCheck
 
 def _place(path: Path) -> tuple[int, int] | None:
     """Where a log stands among those of its folder."""
-    name = LogName.of(path)
+    name = log_name(path)
     return (name.session, name.part) if name else None
 
 
@@ -153,7 +144,7 @@ def _files_of(path: Path) -> list[Path]:
     if not path.is_dir():
         raise BadInput(f"{path}: expected a log, a dump or a folder of them; there is no such file")
     inside = [path, *inside_of(path)]
-    files = {file for file in inside if file.is_file() and (LogName.of(file) or file.name == manifest.NAME
+    files = {file for file in inside if file.is_file() and (log_name(file) or file.name == manifest.NAME
                                                             or file.name.endswith((*DUMP_ENDINGS, *OPEN_DUMP_ENDINGS)))}
     files |= set(other_recordings(inside))
     # An export without its manifest cannot be checked: one that is not there is looked for all the same.
@@ -174,17 +165,17 @@ def _is_dump(path: Path) -> bool:
         return file.read(len(_DUMP_START)) == _DUMP_START
 
 
-def _check_log(path: Path) -> _Findings:
-    findings = _Findings()
+def _check_log(path: Path) -> _Log:
+    findings = FileCheck(path, "log", "open" if _is_part(path) else "finished")
     lines = 0
     sidecar = None if _is_part(path) else _load_sidecar(path, findings)
-    findings.holes = repairs_of(sidecar).holes if sidecar else ()
+    log = _Log(findings, holes=repairs_of(sidecar).holes if sidecar else ())
     with open_regular(path) as file:
         for row in scan(file):
             lines += 1
-            _take_row(findings, row, _is_part(path))
+            _take_row(log, row, _is_part(path))
     empty = not path.stat().st_size
-    if not findings.good and not LogName.of(path) and (lines or empty):
+    if not findings.records_good and not log_name(path) and (lines or empty):
         raise BadInput(f"{path}:1: expected a segment log or a recorded dump, found no row of one")
     if (before := name_before(path.name)) is not None:
         findings.note(f"it was called {before} until an export found another log in its place: a drive of its own")
@@ -193,33 +184,34 @@ def _check_log(path: Path) -> _Findings:
             findings.wrong("line 1: torn: expected the header line of a segment log")
         if sidecar is not None:
             _compare_with_sidecar(sidecar, findings)
-    return findings
+    return log
 
 
-def _take_row(findings: _Findings, row: Row, is_open: bool) -> None:
+def _take_row(log: _Log, row: Row, is_open: bool) -> None:
     """Count one row; in an open file a torn one is as it should be."""
+    findings = log.check
     if row.record is None:
-        findings.damaged_since_last += 1
+        log.damaged_since_last += 1
         if row.torn:
-            findings.torn += 1
+            findings.records_torn += 1
         else:
-            findings.corrupt += 1
+            findings.records_corrupt += 1
         if not (row.torn and is_open):
             findings.wrong(f"line {row.number}: {'torn' if row.torn else 'corrupt'}: {row.problem}")
         return
     if row.torn and not is_open:
         findings.wrong(f"line {row.number}: torn: expected a newline at the end of a finished log")
-    findings.good += 1
-    if findings.last is None:
-        findings.first = row.record
-        findings.damaged_before_first = findings.damaged_since_last
+    findings.records_good += 1
+    if log.last is None:
+        log.first = row.record
+        log.damaged_before_first = log.damaged_since_last
     else:
-        _compare(findings, findings.last, row.record, findings.damaged_since_last, f"line {row.number}", findings.holes)
-    findings.last = row.record
-    findings.damaged_since_last = 0
+        _compare(findings, log.last, row.record, log.damaged_since_last, f"line {row.number}", log.holes)
+    log.last = row.record
+    log.damaged_since_last = 0
 
 
-def _compare(findings: _Findings, before: WindowRecord, after: WindowRecord, damaged: int, place: str,
+def _compare(findings: FileCheck, before: WindowRecord, after: WindowRecord, damaged: int, place: str,
              holes: Sequence[Hole]) -> None:
     """Note a gap between two records that should follow each other, but for as many damaged lines between them and for
     the holes that repairs have left."""
@@ -237,7 +229,7 @@ def _compare(findings: _Findings, before: WindowRecord, after: WindowRecord, dam
                        f"found {after.t_us / US_PER_S:.6f} s")
 
 
-def _load_sidecar(path: Path, findings: _Findings) -> dict[str, Any] | None:
+def _load_sidecar(path: Path, findings: FileCheck) -> dict[str, Any] | None:
     try:
         sidecar = load_sidecar(path)
     except ValueError as error:
@@ -247,7 +239,7 @@ def _load_sidecar(path: Path, findings: _Findings) -> dict[str, Any] | None:
         findings.wrong(f"sidecar: expected a readable file ({error.strerror})")
         return None
     if sidecar is None:
-        if LogName.of(path):
+        if log_name(path):
             findings.wrong(f"sidecar: expected {path.with_suffix('.json').name} beside it; it is missing")
         return None
     if sidecar.content.get(SETTINGS_LOST) is True:
@@ -257,46 +249,43 @@ def _load_sidecar(path: Path, findings: _Findings) -> dict[str, Any] | None:
     return sidecar.content
 
 
-def _compare_with_sidecar(sidecar: dict[str, Any], findings: _Findings) -> None:
+def _compare_with_sidecar(sidecar: dict[str, Any], findings: FileCheck) -> None:
     said = sidecar.get("log")
     rows = said.get("rows") if isinstance(said, dict) else None
     if not isinstance(rows, int):
         findings.wrong("sidecar: expected the number of rows of a finished log")
-    elif not findings.good <= rows <= findings.good + findings.corrupt + findings.torn:
+    elif not 0 <= rows - findings.records_good <= findings.records_corrupt + findings.records_torn:
         findings.gaps += 1
-        findings.wrong(f"gap: expected the {rows} rows that the sidecar lists, found {findings.good}")
+        findings.wrong(f"gap: expected the {rows} rows that the sidecar lists, found {findings.records_good}")
 
 
-def _compare_neighbours(logs: dict[Path, _Findings]) -> None:
+def _compare_neighbours(logs: dict[Path, _Log]) -> None:
     """Note rows and files that are missing between the parts of a session; a part without a row may hold a hole."""
-    named = sorted((path.parent, name.session, name.part, not name.finished, path)
-                   for path in logs if (name := LogName.of(path)))
+    named = sorted((path.parent, name.session, name.part, name.is_open, path)
+                   for path in logs if (name := log_name(path)))
     for _, session in groupby(named, key=lambda entry: entry[:2]):
         before: tuple[int, Path] | None = None
         holes: list[Hole] = []
         for *_, part, _, path in session:
-            findings = logs[path]
-            holes += findings.holes
-            if findings.last is None or findings.first is None:
+            log = logs[path]
+            holes += log.holes
+            if log.last is None or log.first is None:
                 continue
             if before is not None and before[0] != part:
                 earlier = logs[before[1]]
-                damaged = earlier.damaged_since_last + findings.damaged_before_first
+                damaged = earlier.damaged_since_last + log.damaged_before_first
                 assert earlier.last is not None
-                _compare(findings, earlier.last, findings.first, damaged, f"after {before[1].name}", holes)
-            before, holes = (part, path), list(findings.holes)
+                _compare(log.check, earlier.last, log.first, damaged, f"after {before[1].name}", holes)
+            before, holes = (part, path), list(log.holes)
 
 
 def _check_dump(path: Path) -> FileCheck:
-    findings = _Findings()
-    if not _is_part(path):
-        _take_events(findings, path)
-        return findings.check(path, "dump", "dump")
-    if _has_begun(path):
+    findings = FileCheck(path, "dump", "open" if _is_part(path) else "dump")
+    if not _is_part(path) or _has_begun(path):
         _take_events(findings, path)
     else:
-        findings.torn = 1 if path.stat().st_size else 0  # its first block is not whole yet
-    return findings.check(path, "dump", "open")
+        findings.records_torn = 1 if path.stat().st_size else 0  # its first block is not whole yet
+    return findings
 
 
 def _has_begun(path: Path) -> bool:
@@ -307,13 +296,13 @@ def _has_begun(path: Path) -> bool:
         return file.readline(LINE_BYTES + 1).endswith(b"\n")
 
 
-def _take_events(findings: _Findings, path: Path) -> None:
+def _take_events(findings: FileCheck, path: Path) -> None:
     """Count the events of a dump; in an open one a torn end is as it should be."""
     heard_us: int | None = None
     try:
         with open_dump(path) as reader:
             for event in reader:
-                findings.good += 1
+                findings.records_good += 1
                 if event.source not in ACCELEROMETERS:
                     continue
                 if heard_us is not None and event.t_us - heard_us > SILENCE_US:
@@ -322,17 +311,17 @@ def _take_events(findings: _Findings, path: Path) -> None:
                                   f"and {event.t_us / US_PER_S:.6f} s")
                 heard_us = event.t_us
             if reader.torn_tail:
-                findings.torn = 1
+                findings.records_torn = 1
             if reader.torn_tail and not _is_part(path):
                 findings.wrong("torn: the recording ends in the middle of a line or of its compressed data")
     except DumpError as error:
-        findings.corrupt = 1
+        findings.records_corrupt = 1
         findings.wrong(f"corrupt: {str(error).removeprefix(f'{path}:')}")
 
 
 def _check_manifest(path: Path) -> FileCheck:
     """Compare the files beside a manifest with it: as listed, changed (corrupt), missing or not listed (gaps)."""
-    findings = _Findings()
+    findings = FileCheck(path, "manifest", "manifest")
     with DirectoryHandle.at(path.parent) as folder:
         try:
             with folder.open(manifest.NAME) as file:
@@ -340,22 +329,22 @@ def _check_manifest(path: Path) -> FileCheck:
         except OSError as error:
             findings.gaps = 1
             findings.wrong(f"expected a list of what was exported ({error.strerror}); export again")
-            return findings.check(path, "manifest", "manifest")
+            return findings
         except ValueError as error:
-            findings.corrupt = 1
+            findings.records_corrupt = 1
             findings.wrong(f"corrupt: {error}")
-            return findings.check(path, "manifest", "manifest")
-        present = {name for name in folder.each_name() if name in listed or LogName.of(Path(name))
+            return findings
+        present = {name for name in folder.each_name() if name in listed or log_name(Path(name))
                    or name.endswith(DUMP_ENDINGS)}
         for name, digest in listed.items():
             _compare_with_manifest(findings, folder, name, digest, name in present)
     for name in sorted(present - set(listed)):
         findings.gaps += 1
         findings.wrong(f"{name}: expected in the manifest; the export was cut short, export again")
-    return findings.check(path, "manifest", "manifest")
+    return findings
 
 
-def _compare_with_manifest(findings: _Findings, folder: DirectoryHandle, name: str, digest: str, present: bool) -> None:
+def _compare_with_manifest(findings: FileCheck, folder: DirectoryHandle, name: str, digest: str, present: bool) -> None:
     if not present:
         findings.gaps += 1
         findings.wrong(f"{name}: missing")
@@ -365,7 +354,7 @@ def _compare_with_manifest(findings: _Findings, folder: DirectoryHandle, name: s
     except OSError as error:
         found = str(error.strerror)
     if found == digest:
-        findings.good += 1
+        findings.records_good += 1
     else:
-        findings.corrupt += 1
+        findings.records_corrupt += 1
         findings.wrong(f"{name}: corrupt: expected SHA-256 {digest}, found {found}")

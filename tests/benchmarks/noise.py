@@ -44,7 +44,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from drivers.accelerometers.bma220 import Bma220Settings
+from drivers.accelerometers.bma220 import Bma220Config
 from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.units import MPH_MPS, STANDARD_GRAVITY_MPS2, WINDOW_M
 
@@ -172,7 +172,7 @@ def step_of(range_g: int) -> float:
 
 def wider(reads: int) -> float:
     """How much more noise a reading has where the chip is read so often, through the filter that goes with it."""
-    return sqrt(Bma220Settings(oversample=reads).filter_hz / Bma220Settings().filter_hz)
+    return sqrt(Bma220Config(oversample=reads).filter_hz / Bma220Config(oversample=1).filter_hz)
 
 
 def four_ways(noise: float, range_g: int, mph: int, level: float, windows: int, number: int, reads: int

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from smbus2 import I2cFunc
 
-from drivers.accelerometers.bma220 import REGISTER_STEP, Bma220, Bma220Chip, Bma220Settings, mps2_per_count
+from drivers.accelerometers.bma220 import REGISTER_STEP, Bma220, Bma220Chip, Bma220Config, mps2_per_count
 from drivers.errors import BadReply, NotPresent
 from drivers.hardware import open_i2c
 
@@ -72,7 +72,7 @@ def test_a_sample_that_was_renewed_while_it_was_read_is_never_taken(
 ) -> None:
     with pytest.MonkeyPatch.context() as patch:
         bus = Renewing(taken, every, first)
-        chip = Bma220(opened(patch, BYTES, bus)(), Bma220Settings(), lambda seconds: None)  # type: ignore[arg-type]
+        chip = Bma220(opened(patch, BYTES, bus)(), Bma220Config(oversample=1), lambda seconds: None)  # type: ignore[arg-type]
         chip.start()
         got = []
         for _ in range(20):
@@ -119,7 +119,7 @@ def test_few_readings_are_lost_on_a_rough_road(
         return taken[int(now_ms)][(register - 4) // 2]
 
     monkeypatch.setattr(chip, "read_byte_data", read)
-    sensor = Bma220(opened(monkeypatch, BYTES, chip)(), Bma220Settings(), lambda seconds: None)  # type: ignore[arg-type]
+    sensor = Bma220(opened(monkeypatch, BYTES, chip)(), Bma220Config(oversample=1), lambda seconds: None)  # type: ignore[arg-type]
     sensor.start()
     lost = 0
     for number in range(2900):
@@ -134,7 +134,7 @@ def test_few_readings_are_lost_on_a_rough_road(
 
 def test_an_adapter_with_block_reads_is_used_as_before(monkeypatch: pytest.MonkeyPatch) -> None:
     bus = RecordedBus(Bma220Chip())
-    chip = Bma220(opened(monkeypatch, BYTES | I2cFunc.SMBUS_READ_I2C_BLOCK, bus)(), Bma220Settings(),  # type: ignore[arg-type]
+    chip = Bma220(opened(monkeypatch, BYTES | I2cFunc.SMBUS_READ_I2C_BLOCK, bus)(), Bma220Config(oversample=1),  # type: ignore[arg-type]
                   lambda seconds: None)
     chip.start()
     bus.load(b"\x04\x08\x40")
@@ -152,7 +152,7 @@ def test_an_adapter_without_byte_transfers_is_refused_in_words(
 
 def test_a_fault_of_the_wire_passes_through(monkeypatch: pytest.MonkeyPatch) -> None:
     bus = Renewing([(0, 0, 64)], 100, 0)
-    chip = Bma220(opened(monkeypatch, BYTES, bus)(), Bma220Settings(), lambda seconds: None)  # type: ignore[arg-type]
+    chip = Bma220(opened(monkeypatch, BYTES, bus)(), Bma220Config(oversample=1), lambda seconds: None)  # type: ignore[arg-type]
     chip.start()
     monkeypatch.setattr(bus, "read_byte_data", lambda *a: (_ for _ in ()).throw(OSError(errno.EREMOTEIO, "nack")))
     with pytest.raises(NotPresent, match="nothing answers"):

@@ -7,11 +7,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.accelerometers.bma220 import Bma220, Bma220Chip, Bma220Settings
+from drivers.accelerometers.bma220 import Bma220, Bma220Chip, Bma220Config
 from drivers.dump import Event
 from drivers.errors import BadReply, DumpError, NotPresent, Timeout
 
-from ..support.recorded_wires import Cue, Fault, RecordedBus, RecordedPort
+from ..support.recorded_wires import Cue, Fault, RecordedBus, RecordedPort, WithoutWatchdog
 
 
 class Clock:
@@ -27,8 +27,8 @@ class Clock:
         self.now += round(seconds * 1e6)
 
 
-def started(bus: RecordedBus, chosen: Bma220Settings | None = None) -> Bma220:
-    bma220 = Bma220(bus, chosen or Bma220Settings(), lambda seconds: None)
+def started(bus: RecordedBus) -> Bma220:
+    bma220 = Bma220(bus, Bma220Config(oversample=1), lambda seconds: None)
     bma220.start()
     return bma220
 
@@ -109,8 +109,8 @@ def test_a_bus_held_low_is_freed_by_the_chips_watchdog() -> None:
 
 def test_without_the_watchdog_it_stays_low_until_the_power_goes() -> None:
     clock = Clock()
-    bus = RecordedBus(Bma220Chip(), [Cue(Fault.STUCK_LOW, at_read=1), Cue(Fault.REPLUG, at_us=50)], clock.now_us)
-    bma220 = started(bus, Bma220Settings(watchdog_ms=0))
+    bus = RecordedBus(WithoutWatchdog(), [Cue(Fault.STUCK_LOW, at_read=1), Cue(Fault.REPLUG, at_us=50)], clock.now_us)
+    bma220 = started(bus)
     assert outcomes(bus, bma220, 4) == ["ok", "Timeout", "Timeout", "Timeout"]
     with pytest.raises(Timeout, match="held low"):
         bma220.start()

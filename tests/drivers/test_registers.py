@@ -7,9 +7,8 @@ from hypothesis import strategies as st
 from drivers.chip_bus import Register, RegisterField, ToggleRegister
 from drivers.errors import BadReply, SettingsError
 
-MIDDLE = RegisterField("middle", 5, 3)
-TOP = RegisterField("top", 7, 7)
-SOME = Register("some", 0x22)
+SOME = Register("some", 0x22, 0x00, {"middle": (5, 3), "top": (7, 7)})
+MIDDLE = SOME.field("middle")
 
 
 class Bytes:
@@ -63,19 +62,19 @@ def test_a_field_lies_inside_a_byte() -> None:
 
 def test_update_leaves_the_other_bits_as_they_were() -> None:
     bus = Bytes(0b0100_0110)
-    SOME.update(bus, 0x0A, {MIDDLE: 0b101, TOP: 1})
+    SOME.update(bus, 0x0A, {"middle": 0b101, "top": 1})
     assert bus.writes == [(0x0A, 0x22, 0b1110_1110)]
 
 
 def test_update_notices_a_bit_that_was_not_taken() -> None:
     with pytest.raises(BadReply, match=r"register 0x22 \(some\) of the chip at 0x0A: middle reads 7, expected 5"):
-        SOME.update(Bytes(forced=0b0001_0000), 0x0A, {MIDDLE: 0b101})
+        SOME.update(Bytes(forced=0b0001_0000), 0x0A, {"middle": 0b101})
 
 
 def test_a_value_that_does_not_fit_writes_nothing() -> None:
     bus = Bytes()
     with pytest.raises(SettingsError):
-        SOME.update(bus, 0x0A, {TOP: 1, MIDDLE: 8})
+        SOME.update(bus, 0x0A, {"top": 1, "middle": 8})
     assert bus.writes == []
 
 

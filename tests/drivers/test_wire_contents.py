@@ -241,4 +241,4 @@ def test_a_profile_of_ones_own_reads_lines_of_another_form(line: str, layout: st
     decoder.flush()
     block = decoder.take()
     assert np.allclose(block.accel_mps2, [0.49, -0.98, 9.80], atol=0.01)
-    assert decoder.counters.bad_frames == 1
+    assert decoder.counts["bad_frames"] == 1

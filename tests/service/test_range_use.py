@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from drivers.accelerometers import accelerometers
-from drivers.accelerometers.bma220 import Bma220Config, Bma220Settings
+from drivers.accelerometers.bma220 import Bma220Config
 from drivers.readings import AccelerationBlock, Fix
 from logger.commands.status import advice
 from logger.service.drive_readings import FEWEST_WINDOWS, RangeUse
@@ -86,7 +86,7 @@ def test_a_sensor_without_such_settings_gets_no_advice(name: str) -> None:
 
 @pytest.mark.slow
 def test_status_says_it_of_a_drive_at_8_g_that_needs_2(tmp_path: Path) -> None:
-    car = Car(tmp_path, settings=Bma220Settings(range_g=8))
+    car = Car(tmp_path, settings=Bma220Config(range_g=8, oversample=1))
     car.sample = lambda second: bytes((0, 0, 4 * (4 + car.rng.randrange(-1, 2))))
     car.speed_mps = 20.0
     status = car.drive(3 + 1.2 * FEWEST_WINDOWS * 7.62 / 20.0)

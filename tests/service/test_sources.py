@@ -6,14 +6,14 @@ from collections import deque
 
 import pytest
 
-from drivers.accelerometers.bma220 import FILTER, RANGE, Bma220Chip, Bma220Settings, chip_source
+from drivers.accelerometers.bma220 import FILTER, RANGE, Bma220Chip, Bma220Config, chip_source
 from drivers.dump import Event
 from logger.service.main_loop import EventMerger, Listener, MainLoop
 from logger.service.supervisor import Supervisor
 
 from ..support.recorded_wires import RecordedBus
 
-SETTINGS = Bma220Settings(range_g=4)
+SETTINGS = Bma220Config(range_g=4, oversample=1)
 STEP_US = 10_000
 FILTER_CODE_32_HZ = 5
 

@@ -6,7 +6,7 @@ import itertools
 
 import pytest
 
-from drivers.accelerometers.bma220 import Bma220Chip, Bma220Settings, chip_source
+from drivers.accelerometers.bma220 import Bma220Chip, Bma220Config, chip_source
 from drivers.dump import Event
 from drivers.errors import DeviceError, NotPresent, Timeout
 from drivers.sources import SerialSource
@@ -154,7 +154,7 @@ def test_whatever_leaves_a_source_costs_its_own_readings_only(
 @pytest.mark.parametrize("fault", [Fault.NACK, Fault.TIMEOUT, Fault.STUCK_LOW])
 def test_the_chip_comes_back_after_a_fault_of_the_bus(clock: Clock, fault: Fault) -> None:
     bus = RecordedBus(Bma220Chip(), cues=[Cue(fault, at_read=4)], now_us=clock)
-    source = chip_source(lambda: bus, Bma220Settings(), clock, lambda seconds: None)
+    source = chip_source(lambda: bus, Bma220Config(oversample=1), clock, lambda seconds: None)
     supervisor = Supervisor(source, clock)
     seen = []
     for count in range(400):
@@ -169,7 +169,7 @@ def test_the_chip_comes_back_after_a_fault_of_the_bus(clock: Clock, fault: Fault
 def test_a_chip_that_was_unplugged_is_started_again_with_its_settings(clock: Clock) -> None:
     cues = [Cue(Fault.UNPLUG, at_us=2_000_000), Cue(Fault.REPLUG, at_us=9_000_000)]
     bus = RecordedBus(Bma220Chip(), cues=cues, now_us=clock)
-    source = chip_source(lambda: bus, Bma220Settings(range_g=4), clock, lambda seconds: None)
+    source = chip_source(lambda: bus, Bma220Config(range_g=4, oversample=1), clock, lambda seconds: None)
     supervisor = Supervisor(source, clock)
     seen_us = []
     for _ in range(2000):

@@ -17,7 +17,8 @@ from logger.records import WindowRecord
 from logger.store import integrity as verify_of_store
 from logger.store.export.export import export
 from logger.store.integrity import SHOWN_PROBLEMS, FileCheck, verify
-from logger.store.log.log_writer import SegmentLog, repair
+from logger.store.log.log_writer import SegmentLog
+from logger.store.log.recovery import repair
 from logger.store.log.row_format import HEADER, format_row
 
 RECORD = WindowRecord(

@@ -17,6 +17,7 @@ from dataclasses import dataclass
 from enum import Enum, auto
 from typing import Protocol, Self
 
+from drivers.accelerometers.bma220 import Bma220Chip
 from drivers.played_bus import PlayedBus, PlayedRecording, RecordedChip, os_error
 from drivers.readings import US_PER_S, Event
 
@@ -98,6 +99,12 @@ class FailingChip(RecordedChip, Protocol):
     @property
     def watchdog_on(self) -> bool: ...
     def lose_power(self) -> None: ...
+
+
+class WithoutWatchdog(Bma220Chip):
+    """A chip whose watchdog does nothing, whatever it is told."""
+
+    watchdog_on = False
 
 
 class RecordedBus(PlayedBus):

@@ -33,7 +33,7 @@ from logger.records import WindowRecord
 from logger.roads.iso8608 import iri_class
 from logger.service.pipeline import longest_wait_us
 from logger.service.signal_chain import LEAST_WORD
-from logger.store.log.log_writer import LogName
+from logger.store.log.log_name import log_name
 from logger.store.log.row_format import read_log
 from logger.store.log.sidecar import sidecar_or_nothing
 from logger.units import US_PER_S
@@ -214,8 +214,8 @@ def read_sessions(directory: Path) -> list[LoggedSession]:
     """The sessions whose logs lie in a folder, oldest first. Raises ``OSError``."""
     files: dict[int, list[tuple[int, bool, Path]]] = defaultdict(list)
     for path in directory.iterdir():
-        if name := LogName.of(path):
-            files[name.session].append((name.part, name.finished, path))
+        if name := log_name(path):
+            files[name.session].append((name.part, not name.is_open, path))
     sessions = []
     for number, parts in sorted(files.items()):
         # A row that stands in two parts was written again after the disk had failed: the later one counts.
@@ -237,7 +237,7 @@ def read_sessions(directory: Path) -> list[LoggedSession]:
 
 def newest_sidecar(directory: Path) -> dict[str, Any]:
     """What lies beside the newest log in a folder; nothing where there is none. Raises ``OSError``."""
-    logs = [(name.session, name.part, path) for path in directory.iterdir() if (name := LogName.of(path))]
+    logs = [(name.session, name.part, path) for path in directory.iterdir() if (name := log_name(path))]
     return sidecar_or_nothing(max(logs)[2]) if logs else {}
 
 

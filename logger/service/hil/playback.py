@@ -36,7 +36,7 @@ from logger.service.event_core import EventCore
 from logger.service.learning import KnownNoise, delay_at_start
 from logger.service.main_loop import EventMerger
 from logger.service.signal_chain import Axis
-from logger.store.log.log_writer import ClockMap
+from logger.store.log.sidecar import ClockMap
 from logger.units import STANDARD_GRAVITY_MPS2, US_PER_S
 
 PROGRESS_EVERY_US = US_PER_S

@@ -259,13 +259,14 @@ def refuse_long_lines(data: bytes, file: str, first_line: int = 1) -> None:
 # --- its numbers ---
 
 
-def parse_columns(data: bytes, file: str, choose: Callable[[Names], Names | None], header: str
+def parse_columns(data: bytes, file: str, choose: Callable[[Names], Names | None], header: str, gaps: bool = False
                   ) -> tuple[Names, Array, FileOfRows]:
     """The columns of a table that ``choose`` wants, their numbers, (rows, columns), all finite, at least one row, and
     the file's name for ``place``.
 
     choose    gives the names to read out of those in the header, or None when the header will not do
     header    what the header should have been, for the complaint
+    gaps      as of ``read_rows``
 
     Raises BadInput ("file:line: expected ..., found ...").
     """
@@ -275,7 +276,7 @@ def parse_columns(data: bytes, file: str, choose: Callable[[Names], Names | None
         raise table.no_header(header)
     if wanted is None:
         raise BadInput(f"{file}:{table.line}: expected {header}, found {shown(table.found)}{_taken_by(table.names)}")
-    rows = read_rows(table, [table.names.index(name) for name in wanted], wanted)
+    rows = read_rows(table, [table.names.index(name) for name in wanted], wanted, gaps)
     named = FileOfRows(file)
     named.lines = rows.lines
     return wanted, rows.values, named

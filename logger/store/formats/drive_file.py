@@ -37,7 +37,16 @@ from logger.store.formats.profile_file import (
     read_excitation,
     read_profile,
 )
-from logger.store.formats.record_file import DRIVE_NAME, MAX_BYTES, TIME, USABLE, VERTICAL, even_rate_hz, laid_evenly
+from logger.store.formats.record_file import (
+    DRIVE_NAME,
+    MAX_BYTES,
+    TIME,
+    USABLE,
+    VERTICAL,
+    check_grows,
+    even_rate_hz,
+    laid_evenly,
+)
 from logger.store.formats.yaml_nodes import Node, load_mapping
 
 RUN = "run.yaml"
@@ -76,7 +85,8 @@ def write_run_facts(folder: Path, facts: RecordFacts, forces: Sequence[AppliedFo
                             "pass_band_hz": list(facts.pass_band_hz or ()) or None, "source": facts.source,
                             "receiver": _some(facts, _RECEIVER), "places": places if facts.places_by else None,
                             "signals": {one.name: _signal_keys(one) for one in every},
-                            "forces": {one.name: _force_keys(one) for one in forces}}
+                            "forces": {one.name: {"on": one.parts[0]} if len(one.parts) == 1
+                                       else {"between": list(one.parts)} for one in forces}}
     write_text(folder / RUN, yaml.safe_dump({key: value for key, value in said.items() if value not in (None, {})},
                                             sort_keys=False, allow_unicode=True))
 
@@ -110,9 +120,13 @@ def read_run_facts(folder: Path) -> RecordFacts:
 
 def read_forces(folder: Path) -> tuple[AppliedForce, ...]:
     """What the forces of a rig act on, by the ``run.yaml`` of its folder, if any. BadInput as ``read_run_facts``."""
-    path = folder / RUN
-    said = load_mapping(path).mapping(optional=_KEYS) if path.exists() else {}
-    return tuple(_force(name, node) for name, node in said["forces"].mapping().items()) if "forces" in said else ()
+    return tuple(_force(name, node) for name, node in _said(folder, "forces").items())
+
+
+def _said(folder: Path, key: str) -> Mapping[str, Node]:
+    """What a key of ``run.yaml`` holds; nothing where it is not there."""
+    said = load_mapping(folder / RUN).mapping(optional=_KEYS) if (folder / RUN).exists() else {}
+    return said[key].mapping() if key in said else {}
 
 
 def _force(name: str, node: Node) -> AppliedForce:
@@ -125,10 +139,6 @@ def _force(name: str, node: Node) -> AppliedForce:
     if len(parts) != 2 or parts[0] == parts[1] or not {"ground", "base"}.isdisjoint(parts[:1]):
         raise keys["between"].wrong("two parts, as [body, wheel], the ground or the base last")
     return AppliedForce(name, parts)
-
-
-def _force_keys(one: AppliedForce) -> dict[str, object]:
-    return {"on": one.parts[0]} if len(one.parts) == 1 else {"between": list(one.parts)}
 
 
 def facts_beside(drive: Path | str) -> RecordFacts:
@@ -155,9 +165,7 @@ def _within(node: Node, quantity: bounds.Quantity) -> float:
 def check_columns(folder: Path, columns: Collection[str], taken: Collection[str]) -> None:
     """Raise BadInput, with the line, for a signal in a run's ``run.yaml`` that is no column of its drive, or one of
     those that are ``taken`` for something else."""
-    path = folder / RUN
-    said = load_mapping(path).mapping(optional=_KEYS) if path.exists() else {}
-    for name, node in said["signals"].mapping().items() if "signals" in said else ():
+    for name, node in _said(folder, "signals").items():
         if name in taken:
             raise BadInput(f"{node.file}:{node.line}: expected a signal beside the columns {', '.join(taken)}, found "
                            f"{name}")
@@ -382,9 +390,7 @@ def read_speeds(path: Path | str) -> tuple[Array, Array]:
         raise BadInput(f"{place(file, 1)}: expected at least two times, found the end of the file")
     time_s = taken(replace(bounds.TIME, largest=max_time_s), TIME, table[:, 0], file)
     speed_mps = taken(bounds.SPEED, SPEED, table[:, 1], file)
-    if (back := np.diff(time_s) <= 0).any():
-        row = int(np.argmax(back)) + 1
-        raise BadInput(f"{place(file, row)}: expected a time after {time_s[row - 1]:.10g} s, found {time_s[row]:.10g}")
+    check_grows(time_s, file)
     if (speed_mps < 0).any():
         row = int(np.argmax(speed_mps < 0))
         raise BadInput(f"{place(file, row)}: expected a speed of 0 or more, found {speed_mps[row]:g}")

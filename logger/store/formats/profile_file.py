@@ -48,10 +48,8 @@ from logger.profiles.excitation import AppliedForce, Excitation
 from logger.roads.iri import UNITS_M, unit_complaint
 from logger.store.formats.csv_table import (
     LINE_BYTES,
-    find_table,
     parse_columns,
     place,
-    read_rows,
     refuse_long_lines,
     shown,
     taken,
@@ -382,30 +380,23 @@ def read_places(path: Path | str) -> tuple[Array, Array, Array]:
     cannot be.
     """
     path = file_in(path, PROFILE_NAME)
-    file = str(path)
     wanted = (COLUMNS[0], *PLACE)
-    table = find_table(read_bounded(path, MAX_BYTES), file, lambda names: set(wanted) <= set(names))
-    if not set(wanted) <= set(table.names):
-        raise BadInput(f"{file}:{table.line or 1}: expected a header with {','.join(wanted)}: a drive is found on the "
-                       "line by its places")
-    rows = read_rows(table, [table.names.index(name) for name in wanted], wanted, gaps=True)
-    known = np.isfinite(rows.values)
-    for row in np.flatnonzero(known[:, 1:].any(axis=1)):
-        _check_place(rows.values[row], f"{file}:{rows.lines[int(row)]}")
-    distance_m, lat_deg, lon_deg = rows.values[known[:, 1:].all(axis=1)].T.copy()
-    if len(distance_m) < 2:
-        raise BadInput(f"{file}: expected two rows or more with {','.join(PLACE)}, found {len(distance_m)}")
-    return distance_m, lat_deg, lon_deg
-
-
-def _check_place(row: Array, where: str) -> None:
-    distance_m, lat_deg, lon_deg = row
-    if not np.isfinite(row[1:]).all():
-        raise BadInput(f"{where}: expected both of {','.join(PLACE)} or neither")
-    DISTANCE.taken("distances", np.array([distance_m]), lambda row: where)
-    if not (abs(lat_deg) <= 90 and abs(lon_deg) <= 180):
-        raise BadInput(f"{where}: expected degrees within 90 north and south and 180 east and west, found "
-                       f"{lat_deg:g},{lon_deg:g}")
+    _, values, file = parse_columns(
+        read_bounded(path, MAX_BYTES), str(path), lambda names: wanted if set(wanted) <= set(names) else None,
+        f"a header with {','.join(wanted)}: a drive is found on the line by its places", gaps=True)
+    known = np.isfinite(values)
+    placed = known[:, 1:].all(axis=1)
+    if (half := known[:, 1:].any(axis=1) & ~placed).any():
+        raise BadInput(f"{place(file, int(np.argmax(half)))}: expected both of {','.join(PLACE)} or neither")
+    off = placed & ((np.abs(values[:, 1]) > 90) | (np.abs(values[:, 2]) > 180))
+    if off.any():
+        row = int(np.argmax(off))
+        raise BadInput(f"{place(file, row)}: expected degrees within 90 north and south and 180 east and west, found "
+                       f"{values[row, 1]:g},{values[row, 2]:g}")
+    distances_m = taken(DISTANCE, "distances", np.where(placed, values[:, 0], 0.0), file)
+    if placed.sum() < 2:
+        raise BadInput(f"{path}: expected two rows or more with {','.join(PLACE)}, found {placed.sum()}")
+    return distances_m[placed], values[placed, 1].copy(), values[placed, 2].copy()
 
 
 def _from_table(table: Array, file: str, resample_m: float | None) -> Wheelpaths:

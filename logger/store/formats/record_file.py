@@ -58,22 +58,17 @@ def read_record(path: Path | str) -> AccelerationRecord:
 
     Raises BadInput ("file:line: expected ..., found ...") for anything else.
     """
-    file, t_s, accel = read_columns(path)
+    file, t_s, accel, _ = read_columns(path)
     rate_hz = even_rate_hz(t_s, file)
     return AccelerationRecord(float(t_s[0]), rate_hz, accel[VERTICAL], *(accel.get(name) for name in HORIZONTAL))
 
 
-def read_columns(path: Path | str) -> tuple[str, Array, dict[str, Array]]:
+def read_columns(path: Path | str) -> tuple[str, Array, dict[str, Array], Array | None]:
     """The file's name for ``place``, the times (n,) [s] and accelerations by column (n,) of a record, the vertical
-    first, as they are written.
+    first, as they are written, and the column ``usable`` (n,) of a drive; None where there is none.
 
     Raises BadInput ("file:line: expected ..., found ...") but for times that are not even.
     """
-    return read_marked_columns(path)[:3]
-
-
-def read_marked_columns(path: Path | str) -> tuple[str, Array, dict[str, Array], Array | None]:
-    """As ``read_columns``, and the column ``usable`` (n,) of a drive; None where there is none."""
     path = file_in(path, DRIVE_NAME)
     wanted, table, file = parse_columns(read_bounded(path, MAX_BYTES), str(path), _choose, _HEADER)
     if len(table) < 2:

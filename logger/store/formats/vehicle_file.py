@@ -189,8 +189,10 @@ def _read_given(node: Node, vehicle: Vehicle, known: dict[str, Known]) -> Vehicl
         else:
             keys[name] = _plain_number(one, name, known)
     mass_kg = 0.0 if vehicle.model == "component" else vehicle.sprung_mass_kg
-    values = {name: _number_of({name.rpartition(".")[2]: one}, name.rpartition(".")[2], mass_kg,
-                               _is_car_sized(vehicle)) for name, one in keys.items()}
+    wheelbase_m = 0.0 if vehicle.rear is None else vehicle.front.cg_distance_m + vehicle.rear.cg_distance_m
+    is_car = _is_car_sized(wheelbase_m, vehicle.contact_patch_m)
+    values = {name: _number_of({name.rpartition(".")[2]: one}, name.rpartition(".")[2], mass_kg, is_car)
+              for name, one in keys.items()}
     for name, value in values.items():
         if not value > 0:
             raise keys[name].wrong("a number above 0")
@@ -252,28 +254,19 @@ def _with_plain_numbers(top: Node) -> tuple[Node, dict[str, Known]]:
     known: dict[str, Known] = {}
     unknown: list[str] = []
 
-    def plain(node: Node, part: str = "") -> Node:
-        content = dict(node.mapping())
-        for key, one in content.items():
-            if key in _NUMBERS:
-                content[key] = _plain_number(one, part + key, known)
-                unknown.extend([part + key] * _is_unknown(content[key]))
-            elif key in ("front", "rear") and isinstance(one.content, Mapping):
-                content[key] = plain(one, f"{key}.")
-        return replace(node, content=content)
+    def plain(key: str, name: str, one: Node) -> Node:
+        one = _plain_number(one, name, known)
+        unknown.extend([name] * _is_unknown(one))
+        return one
 
-    def filled(node: Node, part: str = "") -> Node:
-        content = dict(node.mapping())
-        for key, one in content.items():
-            if part + key in unknown:
-                value = _usual_number(key, mass_kg)
-                known[part + key] = Known.unknown(part + key, value)
-                content[key] = replace(one, content=repr(value), plain=True)
-            elif key in ("front", "rear") and isinstance(one.content, Mapping):
-                content[key] = filled(one, f"{key}.")
-        return replace(node, content=content)
+    def filled(key: str, name: str, one: Node) -> Node:
+        if name not in unknown:
+            return one
+        value = _usual_number(key, mass_kg)
+        known[name] = Known.unknown(name, value)
+        return replace(one, content=repr(value), plain=True)
 
-    found = plain(top)
+    found = _with_numbers(top, plain)
     if not unknown:
         return found, known
     is_part = "model" in found.mapping() and found.mapping()["model"].content == "component"
@@ -282,7 +275,18 @@ def _with_plain_numbers(top: Node) -> tuple[Node, dict[str, Known]]:
     mass_kg = _usual_number(mass, 1.0)
     if mass in found.mapping() and mass not in unknown:
         mass_kg = found.mapping()[mass].number(above=0.0)
-    return filled(found), known
+    return _with_numbers(found, filled), known
+
+
+def _with_numbers(node: Node, made: Callable[[str, str, Node], Node], part: str = "") -> Node:
+    """A vehicle's file with what is ``made`` of each of its numbers, by its key and its whole name."""
+    content = dict(node.mapping())
+    for key, one in content.items():
+        if key in _NUMBERS:
+            content[key] = made(key, part + key, one)
+        elif key in ("front", "rear") and isinstance(one.content, Mapping):
+            content[key] = _with_numbers(one, made, f"{key}.")
+    return replace(node, content=content)
 
 
 def _usual_number(key: str, sprung_mass_kg: float) -> float:
@@ -306,7 +310,9 @@ def _read(path: Path | str) -> tuple[Vehicle, Mapping[str, Node], dict[str, Know
     keys = top.mapping(required=_COMMON_KEYS + _MODEL_KEYS[model], optional=(
         *(name for one, name in _OPTIONAL if one == model),
         "sensor", "effects", "standard_errors", "correlations", "given", "history"))
-    name = _name_of(keys["name"])
+    name = keys["name"].text()
+    if word(name) != name:
+        raise keys["name"].wrong(f"a name of at most {LONGEST_WORD} characters that can be seen")
     if model in OWN_NAMES:
         bench = Vehicle(name, model, 0.0, None, Axle(0.0, 0.0, 0.0, 0.0, 0.0), None, 0.0)
         own = [key for key in OWN_NAMES[model] if key in keys]
@@ -322,28 +328,12 @@ def _read(path: Path | str) -> tuple[Vehicle, Mapping[str, Node], dict[str, Know
         distance = keys["rear"].mapping()["cg_distance_m"]
         raise distance.wrong(f"axles at least {shortest_wheelbase_m:g} m apart")
     body = {key: _number_of(keys, key, mass_kg, is_car)
-            for key in ("pitch_inertia_kg_m2", "roll_inertia_kg_m2", "track_width_m") if key in keys}
-    vehicle = Vehicle(
-        name=name,
-        model=model,
-        sprung_mass_kg=mass_kg,
-        pitch_inertia_kg_m2=body.get("pitch_inertia_kg_m2"),
-        front=front,
-        rear=rear,
-        contact_patch_m=_number_of(keys, "contact_patch_m", mass_kg, is_car),
-        roll_inertia_kg_m2=body.get("roll_inertia_kg_m2"),
-        track_width_m=body.get("track_width_m"),
-        sensor=_read_sensor(keys["sensor"], model) if "sensor" in keys else AT_CENTRE_OF_GRAVITY,
-    )
+            for key in ("pitch_inertia_kg_m2", "roll_inertia_kg_m2", "track_width_m", "contact_patch_m") if key in keys}
+    sensor = _read_sensor(keys["sensor"], model) if "sensor" in keys else AT_CENTRE_OF_GRAVITY
+    vehicle = Vehicle(name, model, mass_kg, body.get("pitch_inertia_kg_m2"), front, rear, body["contact_patch_m"],
+                      roll_inertia_kg_m2=body.get("roll_inertia_kg_m2"), track_width_m=body.get("track_width_m"),
+                      sensor=sensor)
     return vehicle, keys, known
-
-
-def _name_of(node: Node) -> str:
-    """The name of a car, as it can stand in tables and on pages."""
-    name = node.text()
-    if word(name) != name:
-        raise node.wrong(f"a name of at most {LONGEST_WORD} characters that can be seen")
-    return name
 
 
 def _of_component(node: Node, key: str) -> float:
@@ -355,14 +345,12 @@ def _of_component(node: Node, key: str) -> float:
 def _looks_car_sized(keys: Mapping[str, Node]) -> bool:
     """``_is_car_sized`` of keys, none of which may be right."""
     places = [keys[axle].mapping().get("cg_distance_m") for axle in ("front", "rear") if axle in keys]
-    wheelbase_m = sum(one.number() for one in places if one is not None)
-    return wheelbase_m >= _CAR_WHEELBASE_M or keys["contact_patch_m"].number() >= _CAR_PATCH_M
+    return _is_car_sized(sum(one.number() for one in places if one is not None), keys["contact_patch_m"].number())
 
 
-def _is_car_sized(vehicle: Vehicle) -> bool:
+def _is_car_sized(wheelbase_m: float, contact_patch_m: float) -> bool:
     """Whether its tires or its wheelbase are those of a car."""
-    wheelbase_m = 0.0 if vehicle.rear is None else vehicle.front.cg_distance_m + vehicle.rear.cg_distance_m
-    return wheelbase_m >= _CAR_WHEELBASE_M or vehicle.contact_patch_m >= _CAR_PATCH_M
+    return wheelbase_m >= _CAR_WHEELBASE_M or contact_patch_m >= _CAR_PATCH_M
 
 
 def _number_of(keys: Mapping[str, Node], key: str, sprung_mass_kg: float, is_car: bool) -> float:
@@ -406,11 +394,6 @@ def _read_step(node: Node) -> ModelStep:
     floor = keys.get("noise_floor_error")
     return ModelStep(word(keys["step"].text(), LONGEST_COMPLAINT), keys["error"].number(low=0),
                      None if floor is None or floor.is_null() else floor.number(low=0))
-
-
-def write_vehicle(path: Path | str, vehicle: Vehicle) -> None:
-    """Write a vehicle as a file that ``read_vehicle`` reads back equal, to the last bit. OSError if that fails."""
-    write_model(path, CarModel(vehicle))
 
 
 def write_model(path: Path | str, model: CarModel, comments: str = "") -> None:
@@ -464,8 +447,6 @@ class _Dumper(yaml.SafeDumper):
 
 _Dumper.add_representer(_OneLine, lambda dumper, keys: dumper.represent_mapping("tag:yaml.org,2002:map", keys.items(),
                                                                                 flow_style=True))
-
-
 _Dumper.add_representer(_OneLineList,
                         lambda dumper, row: dumper.represent_sequence("tag:yaml.org,2002:seq", row, flow_style=True))
 

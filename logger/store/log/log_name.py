@@ -65,19 +65,10 @@ def session_of(name: str) -> int | None:
     return int(match[1]) if match else None
 
 
-@dataclass(frozen=True)
-class LogName:
-    """What the name of a log file says."""
-
-    session: int
-    part: int
-    finished: bool
-
-    @classmethod
-    def of(cls, path: Path) -> LogName | None:
-        """The name of a file; None when it is not that of a log."""
-        own = OwnFile.of(path.name)
-        return cls(own.session, own.part, not own.is_open) if own is not None and own.kind == ".csv" else None
+def log_name(path: Path) -> OwnFile | None:
+    """What the name of a log file says; None when it is not that of a log."""
+    own = OwnFile.of(path.name)
+    return own if own is not None and own.kind == ".csv" else None
 
 
 def open_path(finished: Path) -> Path:

@@ -12,27 +12,17 @@ from datetime import UTC, datetime, timedelta
 from hashlib import sha256
 from itertools import accumulate
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from logger.errors import BadInput
-from logger.geodesy import ground_distance_m
+from logger.geodesy import apart_m
 from logger.printable import word, words_in
 from logger.records import WindowRecord
-from logger.store.log.log_name import LogName, finished_path, inside_of, name_before
+from logger.store.log.log_name import finished_path, inside_of, log_name, name_before
 from logger.store.log.row_format import read_log, write_utc
 from logger.store.log.sidecar import read_sidecar
 
 _EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
-
-
-class Placed(Protocol):
-    """Something with a position, or None for it [degrees]."""
-
-    @property
-    def lat_deg(self) -> float | None: ...
-
-    @property
-    def lon_deg(self) -> float | None: ...
 
 
 @dataclass(frozen=True)
@@ -56,10 +46,10 @@ def find_logs(place: Path) -> list[Path]:
     found: dict[tuple[Path, int, int], Path] = {}
     inside = sorted(inside_of(place))
     for path in inside:
-        name = LogName.of(path)
+        name = log_name(path)
         if name is None or path.is_dir():
             continue
-        if name.finished or (path.parent, name.session, name.part) not in found:
+        if not name.is_open or (path.parent, name.session, name.part) not in found:
             found[path.parent, name.session, name.part] = path
     others = other_recordings(inside)
     if not found and not others:
@@ -74,7 +64,7 @@ def other_recordings(paths: Iterable[Path]) -> list[Path]:
     found = []
     for path in sorted(paths):
         before = name_before(path.name)
-        if before is None or LogName.of(named := path.with_name(before)) is None or not path.is_file():
+        if before is None or log_name(named := path.with_name(before)) is None or not path.is_file():
             continue
         mine, theirs = _rows_in(path), rows.setdefault(named, _rows_in(named))
         if mine and not mine & theirs:
@@ -200,13 +190,6 @@ def along_m(records: Sequence[WindowRecord]) -> list[float]:
     """Distance from the first row's start to each row's middle, through all rows [m]."""
     lengths_m = [length_m(record) for record in records]
     return [end - length / 2 for end, length in zip(accumulate(lengths_m), lengths_m, strict=True)]
-
-
-def apart_m(one: Placed, other: Placed) -> float | None:
-    """Distance on the ground between two places some kilometres apart at most [m]; None when one has no position."""
-    if one.lat_deg is None or one.lon_deg is None or other.lat_deg is None or other.lon_deg is None:
-        return None
-    return ground_distance_m(one.lat_deg, one.lon_deg, other.lat_deg, other.lon_deg)
 
 
 def end_utc_us(record: WindowRecord) -> int | None:

@@ -45,24 +45,19 @@ from typing import Any
 from drivers.disk import FileSystem
 from logger.records import WindowRecord
 from logger.store.log.atomic_file import disk_words
-from logger.store.log.log_name import COUNTER_NAME, LogName, finished_path, next_session
+from logger.store.log.log_name import finished_path
 from logger.store.log.recovery import (
-    Repaired,
     fill_finished,
     finish_part,
     first_segments_later,
     logs_of_session,
     remove_part,
-    repair,
     repair_part,
     tally_of,
 )
 from logger.store.log.row_format import HEADER, format_row
-from logger.store.log.sidecar import SIDECAR_BYTES, ClockMap, Tally, read_sidecar, store_sidecar
+from logger.store.log.sidecar import ClockMap, Tally, store_sidecar
 from logger.units import US_PER_S
-
-__all__ = ["COUNTER_NAME", "SIDECAR_BYTES", "ClockMap", "FileSystem", "LogName", "Repaired", "SegmentLog", "Tally",
-           "next_session", "read_sidecar", "repair"]
 
 CLOCK_STEP_US = 100_000
 """A clock map that has moved by less than this need not reach the disk before the file is finished."""

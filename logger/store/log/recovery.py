@@ -13,7 +13,7 @@ from drivers.disk import FileSystem
 from logger.printable import counted
 from logger.store.log import atomic_file
 from logger.store.log import sidecar as sidecars
-from logger.store.log.log_name import COUNTER, LogName, OwnFile, finished_path, open_path, sidecar_path
+from logger.store.log.log_name import COUNTER, OwnFile, finished_path, log_name, open_path, sidecar_path
 from logger.store.log.row_format import HEADER, as_now, format_row
 
 
@@ -53,12 +53,12 @@ def repair(directory: Path, files: FileSystem | None = None,
         _clear(files, path, warn)
     sessions: dict[int, list[Path]] = defaultdict(list)
     for path in directory.iterdir():
-        if (name := LogName.of(path)) and atomic_file.is_file(path):
+        if (name := log_name(path)) and atomic_file.is_file(path):
             sessions[name.session].append(path)
     done = [repaired for _, logs in sorted(sessions.items()) for repaired in _repair_session(files, logs, warn)]
     for sidecar in list(directory.glob("*.json")):
         log = sidecar.with_suffix(".csv")
-        if LogName.of(log) and not atomic_file.is_taken(log) and not atomic_file.is_taken(open_path(log)):
+        if log_name(log) and not atomic_file.is_taken(log) and not atomic_file.is_taken(open_path(log)):
             _remove_lone(files, sidecar, warn)
     return done
 
@@ -175,9 +175,9 @@ def _explains_a_gap(files: FileSystem, part: Path, tally: sidecars.Tally, limit:
 
 def logs_of_session(log: Path) -> list[Path]:
     """All files of the session that a log belongs to, open or finished, in no order."""
-    name = LogName.of(log)
+    name = log_name(log)
     return [path for path in log.parent.iterdir()
-            if (other := LogName.of(path)) and name and other.session == name.session]
+            if (other := log_name(path)) and name and other.session == name.session]
 
 
 def first_segments_later(files: FileSystem, logs: Iterable[Path]) -> dict[Path, int | None]:
@@ -196,7 +196,7 @@ def first_segments_later(files: FileSystem, logs: Iterable[Path]) -> dict[Path, 
 
 def _place(log: Path) -> tuple[int, Path]:
     """Number of the part, then a finished file before an open one; by this the files of a session are in order."""
-    name = LogName.of(log)
+    name = log_name(log)
     return (name.part if name else 0), log
 
 

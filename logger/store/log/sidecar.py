@@ -25,7 +25,7 @@ from drivers.disk import FileSystem
 from logger.files import json_sha256
 from logger.records import WindowRecord
 from logger.store.log.atomic_file import replace_file
-from logger.store.log.log_name import LogName, sidecar_path
+from logger.store.log.log_name import log_name, sidecar_path
 from logger.store.log.row_format import SHORTEST_ROW_BYTES, scan
 
 MOST_HOLES = 1000
@@ -232,7 +232,7 @@ def read_sidecar(log: Path, files: FileSystem | None = None) -> dict[str, Any] |
 def store_sidecar(files: FileSystem, log: Path, given: dict[str, Any], state: str, tally: Tally,
                   clock: ClockMap | None) -> None:
     """Write the sidecar of a log, in place of the old one, in one step."""
-    name = LogName.of(log)
+    name = log_name(log)
     content = given | {
         "clock_map": None if clock is None else asdict(clock),
         "log": {

@@ -20,7 +20,6 @@ from logger.store.formats.vehicle_file import (
     read_on_board,
     read_vehicle,
     write_model,
-    write_vehicle,
 )
 from logger.store.formats.yaml_nodes import MAX_BYTES, parse_mapping
 from logger.vehicle.effect import Chosen, chosen
@@ -144,17 +143,17 @@ def as_its_model_knows_it(car: Vehicle) -> Vehicle:
 def test_a_written_vehicle_is_read_back_to_the_last_bit(tmp_path_factory: pytest.TempPathFactory, car: Vehicle) -> None:
     path = tmp_path_factory.getbasetemp() / "written.yaml"
     car = as_its_model_knows_it(car)
-    write_vehicle(path, car)
+    write_model(path, CarModel(car))
     assert read_vehicle(path) == car
 
 
 def test_a_written_vehicle_looks_like_those_that_people_write(tmp_path: Path) -> None:
     path = tmp_path / "rav4.yaml"
-    write_vehicle(path, read_vehicle(vehicle_file("rav4-2009")))
+    write_model(path, CarModel(read_vehicle(vehicle_file("rav4-2009"))))
     by_hand = [line.split("#")[0].rstrip() for line in TEXT.splitlines()]
     assert path.read_text("utf-8").splitlines() == [line for line in by_hand if line]
     fitted = replace(read_vehicle(path), sprung_mass_kg=np.float64(881.25))
-    write_vehicle(path, fitted)
+    write_model(path, CarModel(fitted))
     assert "\nsprung_mass_kg: 881.25\n" in path.read_text("utf-8")
 
 
@@ -229,7 +228,7 @@ def test_other_units_are_distinguished_from_those_of_the_format(tmp_path: Path, 
 
 def test_the_golden_car_for_one_kilogram_is_a_car(tmp_path: Path) -> None:
     axle = Axle(0.0, 0.15, 63.3, 6.0, 653.0)
-    write_vehicle(tmp_path / "g.yaml", Vehicle("golden", "quarter_car", 1.0, None, axle, None, 0.25))
+    write_model(tmp_path / "g.yaml", CarModel(Vehicle("golden", "quarter_car", 1.0, None, axle, None, 0.25)))
     assert read_vehicle(tmp_path / "g.yaml").front == axle
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from logger.store.log.log_writer import repair
+from logger.store.log.recovery import repair
 
 from ...support.faults.crashes import HAZARDS, Life, crash
 from ...support.faults.disk_models import CrashModel, RecordingFiles

@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 
 from logger.store.integrity import verify
-from logger.store.log.log_writer import ClockMap, SegmentLog, read_sidecar, repair
+from logger.store.log.log_writer import SegmentLog
+from logger.store.log.recovery import repair
 from logger.store.log.row_format import HEADER, format_row, read_log
-from logger.store.log.sidecar import MOST_HOLES
+from logger.store.log.sidecar import MOST_HOLES, ClockMap, read_sidecar
 
 from ...support.faults.crashes import FACTS, OFFSET_US, problems, window
 from ...support.faults.log_damage import HAZARDS

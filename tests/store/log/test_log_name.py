@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from logger.store.log.log_name import LogName, OwnFile, next_session, session_of
+from logger.store.log.log_name import OwnFile, log_name, next_session, session_of
 
 NINES = 200 * "9"
 
@@ -24,12 +24,12 @@ def test_a_name_says_session_part_and_kind(name: str, found: OwnFile) -> None:
                                   "00012-003.csv\n"])
 def test_other_names_are_not_ours(name: str) -> None:
     assert OwnFile.of(name) is None
-    assert LogName.of(Path(name)) is None
+    assert log_name(Path(name)) is None
 
 
 def test_names_of_logs_are_some_of_them() -> None:
-    assert LogName.of(Path("a/00012-003.csv.part")) == LogName(12, 3, finished=False)
-    assert LogName.of(Path("00012-003.json")) is None
+    assert log_name(Path("a/00012-003.csv.part")) == OwnFile(12, 3, ".csv", is_open=True)
+    assert log_name(Path("00012-003.json")) is None
 
 
 def test_a_strange_number_is_no_session(tmp_path: Path) -> None:

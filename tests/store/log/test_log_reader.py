@@ -6,7 +6,8 @@ from typing import Any
 
 import pytest
 
-from logger.store.log.log_reader import along_m, apart_m, iso_utc, joined, split_drives
+from logger.geodesy import apart_m
+from logger.store.log.log_reader import along_m, iso_utc, joined, split_drives
 
 from ...support.drives.logged_rows import rows_of_drive
 

@@ -10,20 +10,15 @@ from typing import Any
 
 import pytest
 
+from drivers.disk import FileSystem
 from logger.records import WindowRecord
 from logger.store.integrity import verify
 from logger.store.log import row_format, sidecar
-from logger.store.log.log_writer import (
-    COUNTER_NAME,
-    SIDECAR_BYTES,
-    ClockMap,
-    FileSystem,
-    SegmentLog,
-    next_session,
-    read_sidecar,
-    repair,
-)
+from logger.store.log.log_name import COUNTER_NAME, next_session
+from logger.store.log.log_writer import SegmentLog
+from logger.store.log.recovery import repair
 from logger.store.log.row_format import HEADER, format_row, parse_row, read_log
+from logger.store.log.sidecar import SIDECAR_BYTES, ClockMap, read_sidecar
 
 from ...support.slow import slow
 

@@ -9,8 +9,10 @@ from typing import Any
 import pytest
 
 from logger.store.integrity import FileCheck, verify
-from logger.store.log.log_writer import SegmentLog, read_sidecar, repair
+from logger.store.log.log_writer import SegmentLog
+from logger.store.log.recovery import repair
 from logger.store.log.row_format import read_log
+from logger.store.log.sidecar import read_sidecar
 
 from ...support.faults.crashes import FACTS, OFFSET_US, window
 

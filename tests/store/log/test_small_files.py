@@ -13,7 +13,8 @@ import pytest
 from logger.service import serve
 from logger.service.config import Config, LogConfig
 from logger.service.systemd_notify import Stop
-from logger.store.log.log_writer import SegmentLog, next_session
+from logger.store.log.log_name import next_session
+from logger.store.log.log_writer import SegmentLog
 
 from ...support.faults.crashes import window
 from ...support.faults.disk_models import RefusingFiles

@@ -11,8 +11,8 @@ from logger.service.config import Config
 from logger.service.event_core import EventCore
 from logger.service.pipeline import Pipeline
 from logger.store.formats.vehicle_file import read_model
-from logger.store.log.log_writer import ClockMap
 from logger.store.log.row_format import format_row
+from logger.store.log.sidecar import ClockMap
 
 
 class Rows:

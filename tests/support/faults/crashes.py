@@ -19,8 +19,10 @@ from logger.records import WindowRecord
 from logger.service.storage import Storage
 from logger.store.integrity import verify
 from logger.store.log.disk_quota import QuotaLimits, repair_recordings
-from logger.store.log.log_writer import ClockMap, next_session, read_sidecar, repair
+from logger.store.log.log_name import next_session
+from logger.store.log.recovery import repair
 from logger.store.log.row_format import format_row, parse_row, read_log
+from logger.store.log.sidecar import ClockMap, read_sidecar
 
 from .disk_models import CrashModel, RecordingFiles, RefusingFiles, RefusingJournal
 from .trials import Found, Hazard

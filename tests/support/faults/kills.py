@@ -30,7 +30,7 @@ from logger.service.status import ServiceStatus, read_status
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.store.integrity import verify
-from logger.store.log.log_writer import LogName
+from logger.store.log.log_name import log_name
 from logger.store.log.row_format import read_log
 
 from ..drives.simulated_drive import DrivePlan, RoadStretch, record, simulate_drive
@@ -147,11 +147,11 @@ class KilledService:
         rows: Rows = {}
         opened = set()
         for path in sorted(self.log.glob("*.csv*")) if self.log.exists() else []:
-            name = LogName.of(path)
+            name = log_name(path)
             if name is not None:
                 content = read_log(path)
                 rows.setdefault(name.session, set()).update(record.segment for record in content.records)
-                if not name.finished:
+                if name.is_open:
                     opened.add(path)
                     self.found.torn_tails += content.damaged_lines
         for session, segments in before.items():

@@ -11,8 +11,10 @@ from pathlib import Path
 from logger.records import WindowRecord
 from logger.store.log.disk_quota import DiskQuota, QuotaLimits
 from logger.store.log.log_reader import read_logged
-from logger.store.log.log_writer import ClockMap, SegmentLog, read_sidecar, repair
+from logger.store.log.log_writer import SegmentLog
+from logger.store.log.recovery import repair
 from logger.store.log.row_format import HEADER, format_row, parse_row, read_log
+from logger.store.log.sidecar import ClockMap, read_sidecar
 
 from .crashes import FACTS, OFFSET_US, problems, window
 from .disk_models import CrashModel, RecordingFiles, RefusingFiles, lay_out

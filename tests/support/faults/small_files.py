@@ -17,8 +17,9 @@ from drivers.disk import FileSystem
 from logger.records import WindowRecord
 from logger.service.storage import Storage
 from logger.store.log.disk_quota import QuotaLimits
-from logger.store.log.log_writer import ClockMap, SegmentLog
+from logger.store.log.log_writer import SegmentLog
 from logger.store.log.row_format import read_log
+from logger.store.log.sidecar import ClockMap
 
 from .crashes import FACTS, HEADER, OFFSET_US, event_of, problems, window
 from .disk_models import RefusingFiles

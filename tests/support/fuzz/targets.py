@@ -34,7 +34,7 @@ from logger.store.formats.drive_file import read_run
 from logger.store.formats.profile_file import read_profile
 from logger.store.formats.record_checks import read_channels
 from logger.store.formats.record_file import read_record
-from logger.store.formats.vehicle_file import read_vehicle, write_vehicle
+from logger.store.formats.vehicle_file import CarModel, read_vehicle, write_model
 from logger.store.integrity import verify
 from logger.store.log.row_format import COLUMNS, HEADER, format_row, read_log, scan
 
@@ -137,7 +137,7 @@ def read_nmea(data: bytes, rng: random.Random) -> Hashable:
     again = whole.feed(0, data) + whole.flush()
     promise([f.lat_deg for f in again] == [f.lat_deg for f in fixes], "other fixes when the bytes are cut elsewhere")
     if not fixes:
-        return ("nothing", decoder.counters.sentences > 0, decoder.counters.malformed > 0)
+        return ("nothing", decoder.counts["sentences"] > 0, decoder.counts["malformed"] > 0)
     said = _Said(data)
     for fix in fixes:
         promise(fix.t_us in arrivals, "a fix that arrived at no time at which bytes did")
@@ -156,9 +156,9 @@ def read_nmea(data: bytes, rng: random.Random) -> Hashable:
             promise(value is None or round(float(value), 9) in said.numbers, f"an invented number {value}")
         if fix.utc_us is not None:
             promise((fix.utc_us - fix.time_of_day_us) % 86_400_000_000 == 0, "a UTC that is not of its time of day")
-    counters = decoder.counters
+    counters = decoder.counts
     return (min(len(fixes), 3), fixes[-1].valid, fixes[-1].utc_us is None, fixes[-1].speed_mps is None,
-            counters.ubx_frames > 0, counters.malformed > 0, counters.refused_dates > 0)
+            counters["ubx_frames"] > 0, counters["malformed"] > 0, counters["refused_dates"] > 0)
 
 
 def nmea() -> Target:
@@ -201,14 +201,14 @@ def pasco_reader(profile: WireProfile) -> Reader:
         promise(bool(np.isfinite(accel).all()), "accelerations that are no numbers")
         promise(len(found_us) == len(accel), "samples without times")
         ahead_us = int(found_us[-1]) - t_us if len(found_us) else 0
-        counters = decoder.counters
+        counters = decoder.counts
         # Times grow by 1 us where they must, also over frames that were refused.
-        promise(ahead_us <= counters.frames + counters.bad_frames, f"a sample {ahead_us} us ahead")
+        promise(ahead_us <= counters["frames"] + counters["bad_frames"], f"a sample {ahead_us} us ahead")
         held = _frames_in(data, profile.layout) if isinstance(profile.layout, FrameLayout) else _lines_in(
             data, profile.layout)
         promise({tuple(row) for row in accel.tolist()} <= held, "a sample that the bytes do not hold")
-        return (len(accel) > 0, len(accel) > 40, counters.bad_frames > 0, counters.resyncs > 0,
-                counters.dropped_bytes > 0)
+        return (len(accel) > 0, len(accel) > 40, counters["bad_frames"] > 0, counters["resyncs"] > 0,
+                counters["dropped_bytes"] > 0)
     return read
 
 
@@ -413,7 +413,7 @@ def vehicle(folder: Path) -> Target:
 
     def read(data: bytes, rng: random.Random) -> Hashable:
         car = read_vehicle(file.hold(data))
-        write_vehicle(copy, car)
+        write_model(copy, CarModel(car))
         promise(read_vehicle(copy) == car, "another car when written and read again")
         return car.model, car.name == "x"
     tokens = (*_YAML_TOKENS, b"quarter_car", b"full_car", b"half_car", b"effects: [x]", b"sensor: {left_m: 1}")
