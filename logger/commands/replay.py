@@ -90,7 +90,8 @@ def replayed(asked: ReplayQuestion) -> Outcome:
     summary = summarise([record for path in files for record in read_log(path).records])
     receiver = drive_fields(pipeline.alignment, config.accelerometer)
     learning, better = NoiseLearning(out, pipeline, config.accelerometer, noise), pipeline.range_use.advice
-    notices = wiring.notices(config, car, sensor)
+    doubts = {"accelerometer": core.accelerometer_doubt, "GPS": core.gps_doubt}
+    notices = (*wiring.notices(config, car, sensor), *(f"{name}: {doubt}" for name, doubt in doubts.items() if doubt))
     lines = [
         screen(summary, sys.stdout.encoding or "ascii"),
         *(["The recording was cut short; everything before the cut was played."] if reader.torn_tail else []),
