@@ -208,6 +208,11 @@ def _name_written(paths: list[Path]) -> None:
             print(printable(f"Wrote {words}"), file=sys.stderr)
 
 
+_LOOP = "Symlink loop from "
+_NOT_THAT: dict[type[OSError], str] = {FileExistsError: "expected a folder, found a file",
+                                       IsADirectoryError: "expected a file, found a folder"}
+
+
 def run() -> NoReturn:
     """The console script."""
     for name, value in ONE_THREAD.items():
@@ -230,15 +235,16 @@ def run() -> NoReturn:
     except OSError as error:
         place = f"{error.filename}: " if error.filename else ""
         status = _complain(f"{place}{_NOT_THAT.get(type(error), error.strerror or error)}", EXIT_BAD_INPUT)
+    except RuntimeError as error:  # pathlib before Python 3.13
+        if not (place := str(error)).startswith(_LOOP):
+            raise
+        status = _complain(f"{place.removeprefix(_LOOP)}: expected a file or a folder, found a loop of symbolic links",
+                           EXIT_BAD_INPUT)
     except MemoryError:
         status = _complain("not enough memory for so much data; cut it into shorter files", EXIT_BAD_INPUT)
     except KeyboardInterrupt:
         status = EXIT_INTERRUPTED
     sys.exit(status)
-
-
-_NOT_THAT: dict[type[OSError], str] = {FileExistsError: "expected a folder, found a file",
-                                       IsADirectoryError: "expected a file, found a folder"}
 
 
 def _complain(message: str, status: int) -> int:

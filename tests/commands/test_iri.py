@@ -118,6 +118,7 @@ def test_uneven_spacing_is_refused_or_resampled_on_request(
     (44, 0.25, [], "expected a profile of at least 11 m, found 10.75 m"),
     (400, 0.5, [], "expected samples at most 0.3 m apart, found 0.5 m"),
     (400, 0.25, ["--resample", "0.31"], "expected samples at most 0.3 m apart, found 0.31 m"),
+    (400, 0.25, ["--window", "inf"], "expected a finite window of at least the 0.25 m between samples, found inf m"),
     (400, 0.25, ["--window", "0.1"], "expected a finite window of at least the 0.25 m between samples, found 0.1 m"),
 ])
 def test_what_has_no_iri_is_refused_by_name(
@@ -128,6 +129,15 @@ def test_what_has_no_iri_is_refused_by_name(
     with pytest.raises(BadInput) as error:
         main(["iri", str(path), *arguments])
     assert str(error.value).startswith(f"{path}: {message}")
+
+
+def test_a_window_beyond_every_profile_is_cut_short_by_its_end(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    path = tmp_path / "flat.csv"
+    path.write_text("distance_m,elevation_m\n" + "".join(f"{0.25 * n:.2f},0\n" for n in range(100)))
+    assert main(["iri", str(path), "--window", "1e308", "--json"]) == 0
+    (window,) = json.loads(capsys.readouterr().out)["windows"]
+    assert window["distance_end_m"] == 24.75
 
 
 def test_the_command_answers_in_one_line(tmp_path: Path) -> None:
