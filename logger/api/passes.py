@@ -199,8 +199,8 @@ def combined_drives(records: Sequence[WindowRecord], length_m: float, above_m_pe
     visits = places_to_visit(mean, a_w, a_w_std, length_m, above_m_per_km)
     return CombinedDrives(len(drives), len(records), len(rows), length_m, above_m_per_km, passes, scatter, mean, a_w,
                           a_w_std, _at(mean.key, speed.key, speed.iri_m_per_km), *place,
-                          None if split_s is None else changes(passes, scatter, split_s), trends(passes, scatter),
-                          visits)
+                          None if split_s is None else changes(passes, scatter, split_s, length_m),
+                          trends(passes, scatter), visits)
 
 
 def _at(key: np.ndarray, among: np.ndarray, values: Array) -> Array:
@@ -327,8 +327,10 @@ def _passes_changes(found: CombinedDrives, change: Changes) -> Iterator[str]:
         return
     words = [changed(change, one) for one in range(len(change.key))]
     worse, better = words.count("worse"), words.count("better")
-    yield (f"Between the two periods {worse} of {counted(len(change.key), 'piece')} of {found.length_m:g} m got worse, "
-           f"{better} better (at most {SIGNIFICANT:.0%} of them by chance; Benjamini & Hochberg)")
+    yield (f"Between the two periods the IRI of {counted(len(change.key), 'piece')} of {found.length_m:g} m changed by "
+           f"{change.mean_m_per_km:+.3f} ± {change.mean_std_m_per_km:.3f} m/km on average")
+    yield (f"{worse} of them got worse, {better} better (at most {SIGNIFICANT:.0%} of these by chance; Benjamini & "
+           "Hochberg)")
     if worse or better:
         cells = np.searchsorted(found.iri.key, change.key).tolist()
         yield from columns([_CHANGE_HEADS, *(
@@ -368,6 +370,8 @@ def as_json(found: CombinedDrives) -> dict[str, Any]:
     return {"drives": found.drives, "windows": found.windows, "placed": found.placed, "length_m": found.length_m,
             "scatter_drive": known(found.scatter.drive), "scatter_pass": known(found.scatter.passes),
             "errors_alike": found.scatter.alike,
+            "mean_change_m_per_km": known(None if found.change is None else found.change.mean_m_per_km),
+            "mean_change_std_m_per_km": known(None if found.change is None else found.change.mean_std_m_per_km),
             "cells": [cell_values(found, index) for index in range(len(found.iri.key))],
             "visits": [visit_values(found, one) for one in found.visits]}
 
@@ -476,7 +480,7 @@ def _page_changes(found: CombinedDrives) -> Html:
     change, cells = found.change, np.searchsorted(found.iri.key, found.change.key).tolist()
     rows = [(place_number(found, cells[one]), changed(change, one), _link(found, cells[one]),
              *_change_cells(found, change, one, cells[one])) for one in largest_changes(change)]
-    return paragraphs(change_lines(found)[:1]) + (grid(_CHANGE_HEADS, rows, words=(0, 1, 2, 3)) if rows else EMPTY)
+    return paragraphs(change_lines(found)[:2]) + (grid(_CHANGE_HEADS, rows, words=(0, 1, 2, 3)) if rows else EMPTY)
 
 
 def _page_visits(found: CombinedDrives, marked: list[int]) -> Html:

@@ -13,7 +13,7 @@ over one place have alike.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -205,6 +205,7 @@ class Changes:
     false_share                share of false finds among all cells whose value is not above this one's (Benjamini &
                                Hochberg, J. R. Stat. Soc. B 57, 1995): 0.05 here means that of the cells listed up to
                                this one 5 % did not change
+    mean_m_per_km              mean change of these cells, with its standard error; NaN where there is none
     """
 
     key: npt.NDArray[np.int64]
@@ -214,10 +215,13 @@ class Changes:
     change_std_m_per_km: Array
     p_value: Array
     false_share: Array
+    mean_m_per_km: float
+    mean_std_m_per_km: float
 
 
-def changes(passes: Passes, scatter: Scatter, split_s: float) -> Changes:
-    """The difference of two periods, before an instant and from it on, in the cells that were passed in both."""
+def changes(passes: Passes, scatter: Scatter, split_s: float, length_m: float) -> Changes:
+    """The difference of two periods, before an instant and from it on, in the cells of a length that were passed in
+    both."""
     early = passes.time_s < split_s
     late = passes.time_s >= split_s
     one, other = means(passes.of(early), scatter), means(passes.of(late), scatter)
@@ -227,7 +231,19 @@ def changes(passes: Passes, scatter: Scatter, split_s: float) -> Changes:
                    for mean, rows in ((one, here), (other, there)))
     std = np.sqrt(variance)
     p_value = two_sided(change / std)
-    return Changes(key, one.drives[here], other.drives[there], change, std, p_value, false_discovery(p_value))
+    mean = _mean_change(passes.of((early | late) & np.isin(passes.key, key)), scatter, split_s, length_m)
+    return Changes(key, one.drives[here], other.drives[there], change, std, p_value, false_discovery(p_value), *mean)
+
+
+def _mean_change(passes: Passes, scatter: Scatter, split_s: float, length_m: float) -> tuple[float, float]:
+    """The mean over cells that were passed in both periods, with its standard error: what is common to a drive does not
+    fall with its cells; what is common to all is in it as far as it differs. Drives that have errors alike differ by
+    less, which is not counted here, as it is not in one cell."""
+    if not len(passes.key):
+        return float("nan"), float("nan")
+    found = _group_means(passes, replace(scatter, alike=0.0), length_m, (passes.time_s >= split_s).astype(np.intp))
+    change, common = (float(np.diff(one)[0]) for one in (found.mean, found.common))
+    return change, float(np.sqrt(found.variance.sum() + common**2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -382,28 +398,53 @@ def way_means(passes: Passes, scatter: Scatter, cell_m: float) -> WayMeans:
     if not len(passes.key):
         none = np.zeros(0, np.intp)
         return WayMeans(none, np.zeros(0), none, np.zeros(0), np.zeros(0))
-    _, cell, weight, total = _weighted(passes, scatter)
+    way, of = np.unique(way_and_cell(passes.key)[0], return_inverse=True)
+    found = _group_means(passes, scatter, cell_m, of)
+    return WayMeans(way, found.covered_m, found.drives, found.mean,
+                    np.sqrt(found.variance + found.alike**2 + found.common**2))
+
+
+@dataclass(frozen=True, eq=False)
+class _GroupMeans:
+    """Means over groups of passes (g,) [m/km].
+
+    variance         of what each drive has alone
+    alike, common    standard errors of what drives over one place, and all windows, have alike
+    """
+
+    covered_m: Array
+    drives: npt.NDArray[np.intp]
+    mean: Array
+    variance: Array
+    alike: Array
+    common: Array
+
+
+def _group_means(passes: Passes, scatter: Scatter, cell_m: float, of: Ints) -> _GroupMeans:
+    """The means over the cells of each group, ``of`` the passes (p,): a cell as in ``way_means``."""
+    _, cell = np.unique(np.stack([of, passes.key]), axis=1, return_inverse=True)
+    cell = cell.ravel()
+    weight = 1.0 / np.maximum(variances(passes, scatter), 1e-12)
     length_m = np.zeros(cell.max() + 1)
     np.maximum.at(length_m, cell, np.minimum(passes.known_m, cell_m))
-    ways, number = way_and_cell(passes.key)
-    way, of = np.unique(ways, return_inverse=True)
-    covered_m = np.zeros(len(way))
-    first = np.unique(cell, return_index=True)[1]
-    np.add.at(covered_m, of[first], length_m)
-    share = weight / total[cell] * length_m[cell] / covered_m[of]
+    covered_m = np.zeros(of.max() + 1)
+    np.add.at(covered_m, of[np.unique(cell, return_index=True)[1]], length_m)
+    share = weight / np.bincount(cell, weight)[cell] * length_m[cell] / covered_m[of]
     mean: Array = np.asarray(np.bincount(of, share * passes.iri_m_per_km), dtype=np.float64)
     pair, which = np.unique(np.stack([of, passes.drive]), axis=1, return_inverse=True)
-    by_drive = np.bincount(which.ravel(), share)
-    order = np.lexsort((passes.key, which.ravel()))
-    at_m = np.asarray(cell_m * number, dtype=np.float64)
-    of_drives = errors_of_means(passes.iri_errors, passes.iri_m_per_km, at_m, share, order, share[order],
-                                which.ravel()[order], len(by_drive))
+    which = which.ravel()
+    by_drive = np.bincount(which, share)
+    order = np.lexsort((passes.key, which))
+    at_m = np.asarray(cell_m * way_and_cell(passes.key)[1], dtype=np.float64)
+    of_drives = errors_of_means(passes.iri_errors, passes.iri_m_per_km, at_m, share, order, share[order], which[order],
+                                len(by_drive))
     of_drive = np.sqrt(of_drives.std**2 - of_drives.common_std**2) * by_drive
-    own = (1 - scatter.alike) * np.bincount(pair[0], of_drive**2) + scatter.alike * np.bincount(pair[0], of_drive) ** 2
-    own += np.bincount(of, share**2 * (variances(passes, Scatter(0.0, scatter.passes)) - passes.own_variance))
-    own += np.bincount(pair[0], by_drive**2) * (np.nan_to_num(scatter.drive) * mean)**2
-    common = np.bincount(pair[0], of_drives.common_std * by_drive)
-    return WayMeans(way, covered_m, np.bincount(pair[0]).astype(np.intp), mean, np.sqrt(own + common**2))
+    variance = (1 - scatter.alike) * np.bincount(pair[0], of_drive**2)
+    variance += np.bincount(of, share**2 * (variances(passes, Scatter(0.0, scatter.passes)) - passes.own_variance))
+    variance += np.bincount(pair[0], by_drive**2) * (np.nan_to_num(scatter.drive) * mean)**2
+    return _GroupMeans(covered_m, np.bincount(pair[0]).astype(np.intp), mean, variance,
+                       np.sqrt(scatter.alike) * np.bincount(pair[0], of_drive),
+                       np.bincount(pair[0], of_drives.common_std * by_drive))
 
 
 def suggestion(iri_m_per_km: float, iri_std_m_per_km: float) -> tuple[str, float]:

@@ -128,7 +128,11 @@ def test_a_place_has_one_number_and_what_got_worse_is_called_so(
     assert main(["passes", str(logs), "--length", "10m", "--split", "2025-06-30", "--above", "4",
                  "--out", str(page), "--out", str(table)]) == 0
     text, shown = capsys.readouterr().out, page.read_text("utf-8")
-    assert text.startswith("Between the two periods 1 of 100 pieces of 10 m got worse, 0 better")
+    first, second = text.splitlines()[:2]
+    said = re.fullmatch(r"Between the two periods the IRI of 100 pieces of 10 m changed by \+(0\.\d+) ± (0\.\d+) "
+                        "m/km on average", first)
+    assert said and 0 < float(said[1]) < 1 and 0 < float(said[2]) < 0.2
+    assert second.startswith("1 of them got worse, 0 better")
     (line,) = [one for one in text.splitlines() if one.split()[1:2] == ["worse"]]
     visits = text.partition("Work list")[2].splitlines()[2:4]
     (bump,) = [one for one in visits if "single bump" in one]

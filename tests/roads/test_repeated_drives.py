@@ -110,7 +110,7 @@ def test_what_all_drives_of_a_car_share_stays_in_a_mean_and_is_in_no_change() ->
     errors = WindowErrors(np.full(8, 0.5), np.zeros(8), np.full(8, 0.4), np.zeros(8))
     passes = Passes(np.ones(8, np.int64), np.arange(8), 1e7 * np.arange(8.0), np.full(8, 3.0), errors, np.full(8, 25.0))
     assert means(passes, Scatter(0.0, 0.0)).iri_std_m_per_km == pytest.approx((0.3**2 / 8 + 0.4**2) ** 0.5)
-    assert changes(passes, Scatter(0.0, 0.0), 3.5e7).change_std_m_per_km == pytest.approx((2 * 0.3**2 / 4) ** 0.5)
+    assert changes(passes, Scatter(0.0, 0.0), 3.5e7, 25.0).change_std_m_per_km == pytest.approx((2 * 0.3**2 / 4) ** 0.5)
 
 
 def test_errors_that_all_drives_over_a_place_have_alike_stay_in_its_mean() -> None:
@@ -127,7 +127,7 @@ def test_errors_that_all_drives_over_a_place_have_alike_stay_in_its_mean() -> No
     off = (found.iri_m_per_km - 3.0) / found.iri_std_m_per_km
     assert np.sqrt(np.mean(off**2)) == pytest.approx(1.0, abs=0.08)
     # What is alike is in no difference; that the rest is smaller than told is not used against a road.
-    assert changes(passes, scatter, 1.5e7).change_std_m_per_km == pytest.approx(0.3 * np.sqrt(1 + 1 / 2))
+    assert changes(passes, scatter, 1.5e7, 25.0).change_std_m_per_km == pytest.approx(0.3 * np.sqrt(1 + 1 / 2))
 
 
 def test_a_mean_is_weighted_by_its_errors() -> None:
@@ -166,16 +166,37 @@ def test_p_values_are_even_where_nothing_changed() -> None:
     found = []
     for _ in range(60):
         passes, _ = random_passes(rng, 8, 40, 0.05, 0.1, 0.03)
-        found.append(changes(passes, Scatter(0.05, 0.03), 4 * 2.6e6).p_value[0])
+        found.append(changes(passes, Scatter(0.05, 0.03), 4 * 2.6e6, 25.0).p_value[0])
         found.append(trends(passes, Scatter(0.05, 0.03)).p_value[1])
     assert stats.kstest(found, "uniform").pvalue > 0.01
+
+
+def test_the_mean_change_of_a_route_has_a_standard_error_that_holds() -> None:
+    """Eight drives over 40 cells that became 0.3 m/km rougher on average: what drives differ by does not fall with the
+    cells."""
+    rng = np.random.default_rng(7)
+    growth, scatter = np.linspace(0.0, 0.15, 40), Scatter(0.05, 0.03)
+    off, told = [], []
+    for _ in range(200):
+        passes, _ = random_passes(rng, 8, 40, 0.05, 0.1, 0.03, growth)
+        found = changes(passes, scatter, 4 * 2.6e6, 25.0)
+        off.append(found.mean_m_per_km - 4 * growth.mean())
+        told.append(found.mean_std_m_per_km)
+    assert np.std(off) == pytest.approx(np.mean(told), rel=0.12)
+    assert abs(np.mean(off)) < 3 * np.mean(told) / np.sqrt(200)
+    one = passes.of(passes.key == 3)
+    alone_there = changes(one, scatter, 4 * 2.6e6, 25.0)
+    assert alone_there.mean_m_per_km == pytest.approx(alone_there.change_m_per_km[0], rel=0.01)
+    assert alone_there.mean_std_m_per_km == pytest.approx(alone_there.change_std_m_per_km[0], rel=0.02)
+    nowhere = changes(passes, scatter, 1e9, 25.0)
+    assert not len(nowhere.key) and np.isnan(nowhere.mean_m_per_km)
 
 
 def test_what_got_worse_is_found_and_little_else() -> None:
     rng = np.random.default_rng(4)
     growth = np.where(np.arange(200) < 20, 0.4, 0.0)
     passes, _ = random_passes(rng, 10, 200, 0.02, 0.05, 0.02, growth)
-    found = changes(passes, scatter_of(passes), 5 * 2.6e6)
+    found = changes(passes, scatter_of(passes), 5 * 2.6e6, 25.0)
     worse = (found.false_share < 0.05) & (found.change_m_per_km > 0)
     assert worse[:20].mean() > 0.95
     assert worse[20:].sum() <= 4
