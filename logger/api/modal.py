@@ -152,8 +152,9 @@ def vehicle_modes(
     columns = (np.array([one.frequency_hz for one in found]), frequency_std_hz,
                np.array([one.damping_ratio for one in found]), damping_std)
     at = f", at {speed_mps:g} m/s on a road of {iri_m_per_km:g} m/km" if known.depends_on_motion else ""
-    text = "\n".join(vehicle_lines(f"{model.vehicle.name}{at}", *columns))
-    return VehicleModes(text, vehicle_json(*columns), *columns)
+    rows = list(zip(*(one.tolist() for one in columns), strict=True))
+    text = [f"{model.vehicle.name}{at}", _HEADS, *(_mode_line(*row) for row in enumerate(rows, start=1))]
+    return VehicleModes("\n".join(text), {"modes": [_mode_json(*row) for row in rows]}, *columns)
 
 
 def found_modes(given: record_checks.ChannelRecord | Path | str, question: ModesQuestion) -> Found:
@@ -387,30 +388,22 @@ def as_json(result: ModalResult, record: ChannelRecord, method: str) -> dict[str
 
 def mode_json(mode: FoundMode, names: tuple[str, ...]) -> dict[str, Any]:
     """One mode; ``names`` of the channels."""
-    return {
-        "frequency_hz": mode.frequency_hz, "damping_ratio": known(mode.damping_ratio),
-        "frequency_std_hz": mode.frequency_std_hz, "damping_std": known(mode.damping_std),
-        "shape": [{"channel": name, "amplitude": float(abs(part)), "phase_deg": degrees(phase(part))}
-                  for name, part in zip(names, mode.shape.tolist(), strict=True)],
-    }
+    return {**_mode_json(mode.frequency_hz, mode.frequency_std_hz, mode.damping_ratio, mode.damping_std),
+            "shape": [{"channel": name, "amplitude": float(abs(part)), "phase_deg": degrees(phase(part))}
+                      for name, part in zip(names, mode.shape.tolist(), strict=True)]}
 
 
-def vehicle_json(frequency_hz: Array, frequency_std_hz: Array, damping_ratio: Array, damping_std: Array
-                 ) -> dict[str, Any]:
-    """Modes (m,) of a vehicle's file; null where a standard deviation is not known."""
-    rows = zip(*(one.tolist() for one in (frequency_hz, frequency_std_hz, damping_ratio, damping_std)), strict=True)
-    return {"modes": [{"frequency_hz": hz, "damping_ratio": ratio, "frequency_std_hz": known(hz_std),
-                       "damping_std": known(ratio_std)} for hz, hz_std, ratio, ratio_std in rows]}
+def _mode_json(hz: float, hz_std: float, ratio: float, ratio_std: float) -> dict[str, Any]:
+    return {"frequency_hz": hz, "damping_ratio": known(ratio), "frequency_std_hz": known(hz_std),
+            "damping_std": known(ratio_std)}
 
 
-def vehicle_lines(title: str, frequency_hz: Array, frequency_std_hz: Array, damping_ratio: Array, damping_std: Array
-                  ) -> list[str]:
-    """The same for a person."""
-    rows = zip(*(one.tolist() for one in (frequency_hz, frequency_std_hz, 100 * damping_ratio, 100 * damping_std)),
-               strict=True)
-    return [title, "mode   frequency Hz           damping %",
-            *(f"{number:4}   {with_error(hz, hz_std):22} {with_error(percent, percent_std)}"
-              for number, (hz, hz_std, percent, percent_std) in enumerate(rows, start=1))]
+_HEADS = "mode   frequency Hz           damping %"
+
+
+def _mode_line(number: int, mode: tuple[float, float, float, float]) -> str:
+    hz, hz_std, ratio, ratio_std = mode
+    return f"{number:4}   {with_error(hz, hz_std):22} {with_error(100 * ratio, 100 * ratio_std)}"
 
 
 def lines(result: ModalResult, record: ChannelRecord, name: str) -> list[str]:
@@ -421,10 +414,10 @@ def lines(result: ModalResult, record: ChannelRecord, name: str) -> list[str]:
              f"{counted(len(record.names), 'channel')}",
              f"{result.how}{order}", ""]
     if result.modes:
-        shown.append("mode   frequency Hz           damping %             shape")
-        shown += [f"{number:4}   {with_error(mode.frequency_hz, mode.frequency_std_hz):22} "
-                  f"{with_error(100 * mode.damping_ratio, 100 * mode.damping_std):21} {_shape_words(mode)}"
-                  for number, mode in enumerate(result.modes, start=1)]
+        said = [_mode_line(number, (one.frequency_hz, one.frequency_std_hz, one.damping_ratio, one.damping_std))
+                for number, one in enumerate(result.modes, start=1)]
+        shown += [f"{words:51} {shape}" for words, shape in zip(
+            [_HEADS, *said], ["shape", *map(_shape_words, result.modes)], strict=True)]
         shown += ["", f"± is one standard deviation. Shape: {', '.join(record.names)[:200]}; the largest is 1."]
     else:
         shown.append("No mode: nothing in this record exceeds noise.")

@@ -205,16 +205,8 @@ def as_json(result: RideComfort) -> dict[str, Any]:
 
 
 def _axis_json(figures: AxisFigures) -> dict[str, Any]:
-    return {
-        "a_w_mps2": figures.a_w_mps2,
-        "mtvv_mps2": figures.mtvv_mps2,
-        "mtvv_exponential_mps2": figures.mtvv_exponential_mps2,
-        "vdv_mps175": figures.vdv_mps175,
-        "crest_factor": known(figures.crest_factor),
-        "mtvv_ratio": known(figures.mtvv_ratio),
-        "vdv_ratio": known(figures.vdv_ratio),
-        "report_beside_a_w": list(figures.beside_a_w()),
-    }
+    names = ("a_w_mps2", "mtvv_mps2", "mtvv_exponential_mps2", "vdv_mps175", "crest_factor", "mtvv_ratio", "vdv_ratio")
+    return {**{name: known(getattr(figures, name)) for name in names}, "report_beside_a_w": list(figures.beside_a_w())}
 
 
 def _word(result: RideComfort, a_w_mps2: float) -> str | None:

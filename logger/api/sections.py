@@ -332,22 +332,21 @@ def section_values(one: DriveSections) -> Iterator[dict[str, Any]]:
     """The sections of a drive by the names of their columns; None where nothing is known."""
     figures = one.figures
     for index, word in enumerate(one.condition):
-        numbers = {name: known(getattr(figures, name)[index]) for name in (
-            "iri_m_per_km", "iri_std_m_per_km", "a_w_mps2", "speed_mps", "worst_m_per_km", "worst_at_m")}
+        numbers = {name: known(getattr(figures, name)[index]) for name in _NUMBERS[3:]}
         a_w = numbers["a_w_mps2"]
         yield {"distance_start_m": float(figures.edges_m[index]), "distance_end_m": float(one.ends_m[index]),
                "known_m": float(figures.known_m[index]), **numbers, "condition": word or None,
                "comfort": None if a_w is None else comfort_word(a_w)}
 
 
-_KINDS = {"distance_start_m": layer.Kind.NUMBER, "distance_end_m": layer.Kind.NUMBER, "known_m": layer.Kind.NUMBER,
-          "iri_m_per_km": layer.Kind.NUMBER, "iri_std_m_per_km": layer.Kind.NUMBER, "a_w_mps2": layer.Kind.NUMBER,
-          "speed_mps": layer.Kind.NUMBER, "worst_m_per_km": layer.Kind.NUMBER, "worst_at_m": layer.Kind.NUMBER,
-          "condition": layer.Kind.WORDS, "comfort": layer.Kind.WORDS}
+_NUMBERS = ("distance_start_m", "distance_end_m", "known_m", "iri_m_per_km", "iri_std_m_per_km", "a_w_mps2",
+            "speed_mps", "worst_m_per_km", "worst_at_m")
+_WORDS = ("condition", "comfort")
 FIELDS = (layer.Attribute("log", layer.Kind.WORDS), layer.Attribute("drive", layer.Kind.COUNT),
           layer.Attribute("t_utc", layer.Kind.TIME),
           layer.Attribute("direction", layer.Kind.WORDS),
-          *(layer.Attribute(name, kind) for name, kind in _KINDS.items()))
+          *(layer.Attribute(name, layer.Kind.NUMBER) for name in _NUMBERS),
+          *(layer.Attribute(name, layer.Kind.WORDS) for name in _WORDS))
 
 
 def _features(drive: DriveSections) -> Iterator[layer.Feature]:
@@ -360,7 +359,8 @@ def _features(drive: DriveSections) -> Iterator[layer.Feature]:
         places = [place for line in geometry for place in line]
         yield layer.Feature(
             layer.group_name(drive.log, drive.number), layer.iri_title(values["iri_m_per_km"]),
-            (drive.log, drive.number, began, drive.direction or None, *(values[name] for name in _KINDS)), geometry,
+            (drive.log, drive.number, began, drive.direction or None,
+             *(values[name] for name in _NUMBERS + _WORDS)), geometry,
             places[len(places) // 2] if places else None, began,
             bool(inside) and index > 0 and lines[inside[0]][1],
             "" if values["iri_m_per_km"] is None else iri_class(values["iri_m_per_km"]))

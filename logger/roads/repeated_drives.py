@@ -439,12 +439,12 @@ def _group_means(passes: Passes, scatter: Scatter, cell_m: float, of: Ints) -> _
     of_drives = errors_of_means(passes.iri_errors, passes.iri_m_per_km, at_m, share, order, share[order], which[order],
                                 len(by_drive))
     of_drive = np.sqrt(of_drives.std**2 - of_drives.common_std**2) * by_drive
-    variance = (1 - scatter.alike) * np.bincount(pair[0], of_drive**2)
+    variance: Array = (1 - scatter.alike) * np.asarray(np.bincount(pair[0], of_drive**2), dtype=np.float64)
     variance += np.bincount(of, share**2 * (variances(passes, Scatter(0.0, scatter.passes)) - passes.own_variance))
     variance += np.bincount(pair[0], by_drive**2) * (np.nan_to_num(scatter.drive) * mean)**2
     return _GroupMeans(covered_m, np.bincount(pair[0]).astype(np.intp), mean, variance,
-                       np.sqrt(scatter.alike) * np.bincount(pair[0], of_drive),
-                       np.bincount(pair[0], of_drives.common_std * by_drive))
+                       np.sqrt(scatter.alike) * np.asarray(np.bincount(pair[0], of_drive), dtype=np.float64),
+                       np.asarray(np.bincount(pair[0], of_drives.common_std * by_drive), dtype=np.float64))
 
 
 def suggestion(iri_m_per_km: float, iri_std_m_per_km: float) -> tuple[str, float]:

@@ -132,7 +132,6 @@ class AddedEffect(CommandResult):
             ("file unchanged", self.error_before), ("parameters refitted", self.error_refitted),
             (f"with {self.effect}", self.error_after)], self.noise_floor_error)]
 
-
     def write(self, path: Path, option: str = "--out") -> None:
         """Write the new vehicle file."""
         vehicle_file.write_model(path, self.model)
@@ -520,23 +519,18 @@ def _table(title: str, unit: str, plain: Sequence[Part], refitted: Sequence[Part
     pairs = lab_words.paired(plain, refitted)
     named, stands = bool(refitted[0].name), any(one is not None for one, _ in pairs)
 
-    def cells(one: Part | None, part: Part) -> doc.Html:
-        bar = doc.html('<td class="bar"><span class="f0" style="width:{:.1%}"></span></td>', part.share)
-        before = doc.html("<td class=n>{}</td>", lab_words.error_text(one, 3) if one else "") if stands else doc.EMPTY
-        return ((doc.html("<td>{}</td>", part.name) if named else doc.EMPTY)
-                + doc.html("<td class=n>{:.3g} to {:.3g}</td>", part.low, part.high) + bar
-                + doc.html("<td class=n>{:.1%}</td><td class=n>{}</td>", part.share,
-                           lab_words.error_text(part, 3)) + before)
-
-    heads = ((doc.Html("<th>Band</th>") if named else doc.EMPTY) + doc.html("<th class=n>From, to [{}]</th>", unit)
-             + doc.Html("<th>Share of the residual</th><th></th><th class=n>NRMSE refitted</th>")
-             + (doc.Html("<th class=n>NRMSE, file unchanged</th>") if stands else doc.EMPTY))
-    rows = doc.concatenated(doc.html("<tr>{}</tr>", cells(one, part)) for one, part in pairs)
-    return doc.section(title, doc.html('<div class="scroll"><table><tr>{}</tr>{}</table></div>', heads, rows))
+    heads = (*(["Band"] if named else []), f"From, to [{unit}]", "Share of the residual", "", "NRMSE refitted",
+             *(["NRMSE, file unchanged"] if stands else []))
+    rows = [(*([part.name] if named else []), f"{part.low:.3g} to {part.high:.3g}",
+             doc.html('<div class="bar"><span class="f0" style="width:{:.1%}"></span></div>', part.share),
+             f"{part.share:.1%}", lab_words.error_text(part, 3),
+             *([lab_words.error_text(one, 3) if one else ""] if stands else [])) for one, part in pairs]
+    return doc.section(title, doc.grid(heads, rows, words=(0, 2) if named else (1,)))
 
 
 def _tests(found: LabComparison) -> doc.Html:
-    rows = [(test.name, _measured(test.value, test.unit), _measured(test.standard_error), _chance(test.p_value),
+    rows = [(test.name, _measured(test.value, test.unit), _measured(test.standard_error),
+             chance(test.p_value) if np.isfinite(test.p_value) else "cannot tell",
              "found" if test in found.tests_found else "") for test in found.tests.tests]
     return doc.section("All tests of the residual", doc.grid(("Test", "Value", "Standard error", "p-value", ""), rows,
                                                                 words=(0, 4))
@@ -558,12 +552,6 @@ def _measured(value: float | None, unit: str = "1") -> str:
     if value is None or not np.isfinite(value):
         return ""
     return f"{value:.3g} {unit}" if unit != "1" else f"{value:.3g}"
-
-
-def _chance(p_value: float) -> str:
-    if not np.isfinite(p_value):
-        return "cannot tell"
-    return "below 1e-9" if p_value < 1e-9 else f"{p_value:.2g}"
 
 
 _AROUND_S = 1.5
