@@ -20,6 +20,10 @@ MOST_SAMPLES = 10_000_000
 """28 hours at 100 Hz, 500 km of road at 0.05 m: 80 MB a column, so that a desk command stays below half a gigabyte."""
 FASTEST_HZ = 1e6
 """No accelerometer is read faster."""
+LONGEST_HOLE_S = 0.5
+"""Over a shorter hole readings lie on a straight line, on which filters run on."""
+ROUNDING_STEPS = 0.2
+"""How far a time may be from an even grid, as digits are rounded: such a share of a step."""
 
 
 @dataclass(frozen=True)

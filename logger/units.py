@@ -10,5 +10,6 @@ MPH_MPS = MILE_M / 3600.0
 INCH_PER_MILE_M_PER_KM = 1000.0 * FOOT_M / 12 / MILE_M
 WINDOW_M = 25 * FOOT_M
 US_PER_S = 1_000_000
+DAY_US = 86_400 * US_PER_S
 LENGTH_UNITS_M = {"m": 1.0, "km": 1000.0, "mi": MILE_M, "ft": FOOT_M}
 """Units that a length may be given in."""

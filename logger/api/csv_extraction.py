@@ -29,14 +29,13 @@ from logger.api.extraction import (
     write_runs,
 )
 from logger.arrays import Array
-from logger.bounds import ACCELERATION, SPEED, samples_between
+from logger.bounds import ACCELERATION, LONGEST_HOLE_S, SPEED, samples_between
 from logger.dsp.repeated_samples import find_holds, resolution, still_until_s
 from logger.errors import BadInput
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.receiver_delay import CarriedDelay, combined
 from logger.extraction.recorded_columns import (
     GRAVITY_WITHIN,
-    LONGEST_HOLE_S,
     NO_GRAVITY_MPS2,
     SEEN,
     EvenSamples,

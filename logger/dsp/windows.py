@@ -97,11 +97,6 @@ class Window:
         return replace(self, accel_rms_mps2=nan, a_w_mps2=nan, mtvv_mps2=nan, vdv_mps175=nan, peak_mps2=nan)
 
 
-# Columns that are summed, then columns of which the largest counts.
-_COUNT, _GOOD, _A2, _W2, _W4, _CLIPPED, _ABSENT, _INTERPOLATED, _UNSETTLED, _BRIDGED, _SPEED = range(11)
-_PEAK, _RUNNING = range(2)
-
-
 class _Open:
     """The window being filled."""
 
@@ -111,9 +106,11 @@ class _Open:
         self.start_m = start_m
         self.whole = whole
         self.last_m: float | None = start_m
-        self.sums = np.zeros(11)
-        self.largest = np.zeros(2)
         self.stood = False
+        self._count = self._good = self._clipped = self._absent = self._interpolated = self._unsettled = 0
+        self._bridged = 0
+        self._accel_square = self._square = self._fourth = self._speed_sum_mps = 0.0
+        self._peak_mps2 = self._running_mps2 = 0.0
 
     def add(self, part: GridSamples, speed_mps: Array, bridged: Bools) -> None:
         """Sum more samples of this window."""
@@ -121,55 +118,52 @@ class _Open:
         weighted = part.weighted_mps2[good]
         squares = weighted * weighted
         accel = part.accel_mps2[good]
-        sums = (
-            len(part),
-            len(weighted),
-            accel @ accel,
-            squares.sum(),
-            squares @ squares,
-            np.count_nonzero(part.clipped),
-            np.count_nonzero(~part.present),
-            np.count_nonzero(part.interpolated),
-            np.count_nonzero(~part.settled & part.present),
-            np.count_nonzero(bridged),
-            speed_mps.sum(),
-        )
-        self.sums += np.array(sums, dtype=np.float64)
+        self._count += len(part)
+        self._good += len(weighted)
+        self._accel_square += float(accel @ accel)
+        self._square += float(squares.sum())
+        self._fourth += float(squares @ squares)
+        self._clipped += int(np.count_nonzero(part.clipped))
+        self._absent += int(np.count_nonzero(~part.present))
+        self._interpolated += int(np.count_nonzero(part.interpolated))
+        self._unsettled += int(np.count_nonzero(~part.settled & part.present))
+        self._bridged += int(np.count_nonzero(bridged))
+        self._speed_sum_mps += float(speed_mps.sum())
         if len(weighted):
-            self.largest = np.maximum(self.largest, (np.abs(weighted).max(), part.running_rms_mps2[good].max()))
+            self._peak_mps2 = max(self._peak_mps2, float(np.abs(weighted).max()))
+            self._running_mps2 = max(self._running_mps2, float(part.running_rms_mps2[good].max()))
 
     def close(self, end_m: float | None, step_s: float, complete: bool) -> Window | None:
         """The finished window; None when nothing is known of it: neither a sample nor a place."""
-        count = self.sums[_COUNT]
+        count, good = self._count, self._good
         blind = self.key[0]
-        if count == 0 or (blind and self.sums[_ABSENT] == count):
+        if count == 0 or (blind and self._absent == count):
             return None
-        good = self.sums[_GOOD]
         known = good >= GOOD_SHARE * count
         return Window(
             t_us=self.t_us,
-            duration_s=float(count * step_s),
+            duration_s=count * step_s,
             start_m=self.start_m,
             end_m=end_m,
             leg=self.key[1],
             number=self.key[2],
-            speed_mps=nan if blind else float(self.sums[_SPEED] / count),
-            samples=int(good),
-            clipped=int(self.sums[_CLIPPED]),
-            accel_rms_mps2=sqrt(self.sums[_A2] / good) if known else nan,
-            a_w_mps2=sqrt(self.sums[_W2] / good) if known else nan,
-            mtvv_mps2=float(self.largest[_RUNNING]) if known else nan,
-            vdv_mps175=float((self.sums[_W4] * step_s) ** 0.25) if known else nan,
-            peak_mps2=float(self.largest[_PEAK]) if known else nan,
+            speed_mps=nan if blind else self._speed_sum_mps / count,
+            samples=good,
+            clipped=self._clipped,
+            accel_rms_mps2=sqrt(self._accel_square / good) if known else nan,
+            a_w_mps2=sqrt(self._square / good) if known else nan,
+            mtvv_mps2=self._running_mps2 if known else nan,
+            vdv_mps175=(self._fourth * step_s) ** 0.25 if known else nan,
+            peak_mps2=self._peak_mps2 if known else nan,
             flags=frozenset(self._flags(blind, complete)),
         )
 
     def _flags(self, blind: bool, complete: bool) -> list[str]:
         found = {
-            "clipped": self.sums[_CLIPPED] > 0,
-            "gap": self.sums[_ABSENT] + self.sums[_INTERPOLATED] > 0,
-            "unsettled": self.sums[_UNSETTLED] > 0,
-            "gps_lost": blind or self.sums[_BRIDGED] > 0,
+            "clipped": self._clipped > 0,
+            "gap": self._absent + self._interpolated > 0,
+            "unsettled": self._unsettled > 0,
+            "gps_lost": blind or self._bridged > 0,
             "blind": blind,
             "stationary": self.stood,
             "partial": not (complete and self.whole),

@@ -22,7 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.arrays import Array, Bools
-from logger.bounds import FASTEST_HZ
+from logger.bounds import FASTEST_HZ, LONGEST_HOLE_S, ROUNDING_STEPS
 from logger.dsp.repeated_samples import (
     burst_ends,
     find_holds,
@@ -39,8 +39,6 @@ from logger.estimation.drive_alignment import MOVED_DEG, angle_rad, has_moved, s
 from logger.geodesy import EARTH_RADIUS_M
 from logger.units import STANDARD_GRAVITY_MPS2
 
-LONGEST_HOLE_S = 0.5
-"""Over a shorter hole readings lie on a straight line: the filters of the service run on over so much as well."""
 KEPT_STANDING_S = 5.0
 
 
@@ -85,7 +83,6 @@ SEEN = 0.45
 _FEWEST = 20  # samples of a piece: the filter's ends are continued by guesses
 _FEW_STEPS = 3.5
 _INSTANT_S = 1e-6
-_EVEN = 0.2  # of a step, as records are read (``store.formats.record_file``)
 
 
 @dataclass(frozen=True, eq=False)
@@ -185,7 +182,7 @@ def _laid(time_s: Array, samples: Array, clipped: Bools, own_hz: float, rate_hz:
           ) -> tuple[Array, Array, Bools, Bools, bool]:
     """On the grid, and whether it stood there."""
     grid_s = time_s[0] + np.arange(int((time_s[-1] - time_s[0]) * rate_hz + 0.5) + 1) / rate_hz
-    if len(grid_s) == len(time_s) and np.abs(time_s - grid_s).max() < _EVEN / rate_hz:
+    if len(grid_s) == len(time_s) and np.abs(time_s - grid_s).max() < ROUNDING_STEPS / rate_hz:
         return grid_s, samples, np.ones(len(grid_s), dtype=np.bool_), clipped, True
     laid = on_even_grid(time_s, samples, own_hz, rate_hz)
     grid_s = time_s[0] + np.arange(len(laid)) / rate_hz

@@ -31,13 +31,13 @@ from logger.errors import BadInput
 from logger.files import BESIDE, DISK, make_folder, naming, read_bounded, replace_bytes
 from logger.fleet.road_map import region_of
 from logger.store.log.atomic_file import FolderLock
+from logger.units import DAY_US
 
 if TYPE_CHECKING:
     import ibis.expr.types as ir
     import pyarrow
 
 
-DAY_US = 86_400_000_000
 EXTRA = "expected the 'fleet' extra: pip install '.[fleet]' in the folder of ridelog's source ({})"
 _MANIFEST = "manifest.json"
 _MAX_BYTES = 512 << 20

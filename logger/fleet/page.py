@@ -25,7 +25,7 @@ import numpy.typing as npt
 from logger.errors import BadInput
 from logger.exchange.layer import Attribute, Feature, Geometry, Kind, Layer, cut, format_of, iri_title
 from logger.files import make_folder, whole_folder, write_file, write_text
-from logger.fleet.dataset import DAY_US, Engine
+from logger.fleet.dataset import Engine
 from logger.fleet.ingest import Counts
 from logger.fleet.road_map import SEGMENT_M, RoadPieces
 from logger.fleet.summary import (
@@ -48,7 +48,7 @@ from logger.report.quantities import known
 from logger.report.summary import distance_words
 from logger.roads.sections import FAIR_TO_IN_PER_MI, FEDERAL_WORDS, GOOD_BELOW_IN_PER_MI, federal_condition
 from logger.store.log.log_reader import iso_utc, utc
-from logger.units import INCH_PER_MILE_M_PER_KM
+from logger.units import DAY_US, INCH_PER_MILE_M_PER_KM
 
 _SHOWN_ROADS = 15
 

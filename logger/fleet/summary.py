@@ -27,13 +27,13 @@ from logger.fleet.dataset import Engine
 from logger.fleet.road_map import ON_MAP, SEGMENT_M, RoadPieces, block_of, cell_keys, section_of
 from logger.roads.repeated_drives import false_discovery, two_sided
 from logger.roads.sections import FAIR_TO_IN_PER_MI
-from logger.units import INCH_PER_MILE_M_PER_KM, MILE_M
+from logger.units import DAY_US, INCH_PER_MILE_M_PER_KM, MILE_M
 
 if TYPE_CHECKING:
     import ibis.expr.types as ir
 
 
-YEAR_US = 365.25 * 86400e6  # A Julian year
+YEAR_US = 365.25 * DAY_US  # A Julian year
 
 
 def passes_by_car(rows: ir.Table, since_us: int | None, until_us: int | None, zero_us: int) -> ir.Table:

@@ -24,6 +24,7 @@ from drivers.disk import FileSystem
 from logger.estimation.drive_alignment import DriveAlignment, heading_deg
 from logger.estimation.receiver_delay import CarriedDelay, combined
 from logger.estimation.sensor_noise import NoiseBelief, Sensor
+from logger.printable import counted
 from logger.service.config import AUTO, LEAST_NOISE_MPS2, MOST_NOISE_MPS2, AccelerometerConfig, GpsConfig
 from logger.service.signal_chain import Axis
 from logger.store.log.atomic_file import replace_file
@@ -168,11 +169,6 @@ class CarriedLearning(Generic[Known]):
         return {}
 
 
-def _drives_words(drives: int) -> str:
-    """How many drives something was learnt over."""
-    return "learnt over 1 drive" if drives == 1 else f"learnt over {drives} drives"
-
-
 def read_noise(folder: Path, config: AccelerometerConfig) -> KnownNoise | None:
     """What earlier drives left of this sensor as it is set; None where there is nothing that can be read."""
     return NOISE.read(folder, lambda fields: fields.get(_OF) == _identity(config))
@@ -224,7 +220,8 @@ class NoiseLearning(CarriedLearning[KnownNoise]):
         if now is None:
             usual = self._config.kind.readings(self._config.settings).noise_mps2
             return f"{usual:.2g} m/s2 assumed{'; it is learnt while driving' if noise == AUTO else ''}"
-        return f"{now.belief.noise_rms_mps2:.2g} ± {now.belief.std_mps2:.1g} m/s2, {_drives_words(now.drives)}"
+        return (f"{now.belief.noise_rms_mps2:.2g} ± {now.belief.std_mps2:.1g} m/s2, learnt over "
+                f"{counted(now.drives, 'drive')}")
 
 
 def delay_at_start(gps: GpsConfig, learnt: CarriedDelay | None) -> CarriedDelay:
@@ -291,7 +288,7 @@ class ReceiverLearning(CarriedLearning[CarriedDelay]):
 
 
 def _belief_words(belief: CarriedDelay) -> str:
-    return f"{belief.delay_s:.2f} ± {belief.std_s:.2f} s, {_drives_words(belief.drives)}"
+    return f"{belief.delay_s:.2f} ± {belief.std_s:.2f} s, learnt over {counted(belief.drives, 'drive')}"
 
 
 def drive_fields(alignment: DriveAlignment, config: AccelerometerConfig) -> dict[str, Any]:

@@ -24,6 +24,7 @@ import numpy.typing as npt
 
 from drivers.readings import AccelerationBlock
 from logger.arrays import Array, Bools, Complex
+from logger.bounds import LONGEST_HOLE_S
 from logger.comfort.iso2631 import RunningRms, comfort_word
 from logger.comfort.uncertain_ride import NO_FIGURES, NoiseFloor, RawFigures, RideFigures, Uncertain
 from logger.dsp.filters import BlockFilter, SectionRows, butterworth_sos, frequency_response
@@ -39,7 +40,6 @@ GRID_RATE_HZ = 100
 GRID_STEP_US = US_PER_S // GRID_RATE_HZ
 GRAVITY_CORNER_HZ = 0.2
 SETTLING_S = 4.0
-LINE_OVER_HOLE_US = 500_000
 SILENCE_US = 2_000_000
 START_MEAN_SAMPLES = 50
 NEARLY = 1.02  # So much faster than the grid a sensor may be without a filter: what folds lies above 48 Hz
@@ -167,7 +167,7 @@ class SignalChain:
     def _restart(self, run: GridRun) -> list[GridSamples]:
         """Before the first run and between two: what is missing, and the state of the filters."""
         hole_us = run.t0_us - self._next_us if self._next_us is not None else 0
-        if self._next_us is not None and self._last_mps2 is not None and hole_us <= LINE_OVER_HOLE_US:
+        if self._next_us is not None and self._last_mps2 is not None and hole_us <= LONGEST_HOLE_S * US_PER_S:
             return self._line(self._next_us, run.t0_us, self._last_mps2, float(run.values[0]))
         out = self._overdue()
         if self._next_us is not None:

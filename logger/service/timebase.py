@@ -11,7 +11,7 @@ import numpy.typing as npt
 from drivers.readings import Fix
 from logger.arrays import Array, Bools
 from logger.geodesy import ground_distance_m
-from logger.units import US_PER_S
+from logger.units import DAY_US, US_PER_S
 
 _INTERVALS_KEPT = 16
 
@@ -37,7 +37,6 @@ class Rhythm:
         self._last_us = t_us
 
 
-DAY_US = 86_400 * US_PER_S
 AGREEING_FIXES = 3
 LASTING_US = 30 * US_PER_S
 JUMP_US = 700_000  # below the one second of a leap second that the receiver learns late

@@ -4,6 +4,7 @@ which shares nothing with ridelog."""
 import json
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -100,6 +101,13 @@ def written(folder: Path, columns: Mapping[str, Array], driving: Mapping[str, Ar
 
 NOTHING = Course(RATE_HZ, np.zeros(len(TIME_S)))
 BODY = "forces: {force_n: {on: body}}\n"
+
+
+@cache
+def ringing(damper: float) -> tuple[Bench, Course, Mapping[str, Array]]:
+    """A mass that rings at 8 Hz, a force on it, and what its sensors measure: integrated once for all tests."""
+    bench, push = Bench(0.8, 2000.0, damper), noise(30.0, 8.0, 4)
+    return bench, push, bench.moved(NOTHING, push, NOTHING)
 
 
 @pytest.mark.parametrize("bench", [
@@ -560,11 +568,11 @@ def test_a_record_follows_its_force_though_the_vehicles_mode_lies_elsewhere(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A rig that rings at 8 Hz (damping ratio 0.8 %), its spring 60 % too stiff in the file; then under a force that
     was another test's."""
-    true = Bench(0.8, 2000.0, 0.6)
+    _, push, moved = ringing(0.6)
     (tmp_path / "bench.yaml").write_text(
         "name: bench\nmodel: single_mass\nmass_kg: 0.8\nstiffness_n_per_m: 3200 +- 60%\ndamping_n_s_per_m: unknown\n")
-    push, other = noise(30.0, 8.0, 4), noise(30.0, 8.0, 5)
-    seen = {"displacement_m": true.moved(NOTHING, push, NOTHING)["displacement_m"]}
+    other = noise(30.0, 8.0, 5)
+    seen = {"displacement_m": moved["displacement_m"]}
     runs = [str(written(tmp_path / name, seen, {"force_n": force(TIME_S)}, BODY))
             for name, force in (("right", push), ("wrong", other))]
     vehicle = str(tmp_path / "bench.yaml")
@@ -580,8 +588,8 @@ def test_a_record_follows_its_force_though_the_vehicles_mode_lies_elsewhere(
 ], ids=["g", "kN"])
 def test_another_unit_is_said(tmp_path: Path, read: float, pushed: float, words: str) -> None:
     """Of a mass that was weighed, its spring known to a third."""
-    push, bench = noise(30.0, 8.0, 4), Bench(0.8, 2000.0, 6.0)
-    record = {"accel_z_mps2": bench.moved(NOTHING, push, NOTHING)["accel_z_mps2"] * read}
+    bench, push, moved = ringing(6.0)
+    record = {"accel_z_mps2": moved["accel_z_mps2"] * read}
     (tmp_path / "bench.yaml").write_text(bench.yaml.replace("0.8", "0.8 +- 1%").replace("2000.0", "1500 +- 30%"))
     run = written(tmp_path / "run", record, {"force_n": push(TIME_S) * pushed}, BODY)
     for verb in ("compare", "identify"):
@@ -590,8 +598,8 @@ def test_another_unit_is_said(tmp_path: Path, read: float, pushed: float, words:
 
 
 def test_a_number_far_from_what_its_file_knows_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    push, bench = noise(30.0, 8.0, 4), Bench(0.8, 2000.0, 6.0)
-    record = {"displacement_m": bench.moved(NOTHING, push, NOTHING)["displacement_m"]}
+    bench, push, moved = ringing(6.0)
+    record = {"displacement_m": moved["displacement_m"]}
     (tmp_path / "bench.yaml").write_text(bench.yaml.replace("2000.0", "1800 +- 2%"))
     run = written(tmp_path / "run", record, {"force_n": push(TIME_S)}, BODY)
     assert main(["identify", "--vehicle", str(tmp_path / "bench.yaml"), str(run)]) == 0
@@ -642,8 +650,7 @@ def test_two_effects_are_added_together(tmp_path: Path, capsys: pytest.CaptureFi
 
 
 def test_the_zeros_of_sensors_are_in_no_error(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    push, bench = noise(30.0, 8.0, 4), Bench(0.8, 2000.0, 6.0)
-    seen = bench.moved(NOTHING, push, NOTHING)
+    bench, push, seen = ringing(6.0)
     (tmp_path / "bench.yaml").write_text(bench.yaml)
     errors = []
     for zero in (0.0, 1.5):
@@ -657,8 +664,7 @@ def test_the_zeros_of_sensors_are_in_no_error(tmp_path: Path, capsys: pytest.Cap
 
 def test_another_unit_of_another_signal_is_said(tmp_path: Path) -> None:
     """Its spring a third too soft in the file; a gain of two is no unit."""
-    push, bench = noise(30.0, 8.0, 4), Bench(0.8, 2000.0, 6.0)
-    seen = bench.moved(NOTHING, push, NOTHING)
+    bench, push, seen = ringing(6.0)
     (tmp_path / "bench.yaml").write_text(bench.yaml.replace("2000.0", "1500 +- 30%"))
     runs = [written(tmp_path / f"times-{times}", {"accel_z_mps2": seen["accel_z_mps2"],
                                                   "displacement_m": times * seen["displacement_m"]},
@@ -779,11 +785,10 @@ def test_the_shortest_test_of_a_part_is_compared_at_any_rate(rate_hz: int, tmp_p
 
 def test_whether_a_record_of_two_signals_follows_its_force_is_seen_in_the_first(tmp_path: Path) -> None:
     """The vehicle's mode lies elsewhere; then under a force that was another test's."""
-    true = Bench(0.8, 2000.0, 0.6)
+    _, push, moved = ringing(0.6)
     (tmp_path / "bench.yaml").write_text(
         "name: bench\nmodel: single_mass\nmass_kg: 0.8\nstiffness_n_per_m: 3200 +- 60%\ndamping_n_s_per_m: unknown\n")
-    push, other = noise(30.0, 8.0, 4), noise(30.0, 8.0, 5)
-    moved = true.moved(NOTHING, push, NOTHING)
+    other = noise(30.0, 8.0, 5)
     seen = {name: moved[name] for name in ("displacement_m", "velocity_mps")}
     runs = [str(written(tmp_path / name, seen, {"force_n": force(TIME_S)}, BODY))
             for name, force in (("right", push), ("wrong", other))]

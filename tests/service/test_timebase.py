@@ -8,7 +8,8 @@ from datetime import UTC, datetime
 import pytest
 
 from drivers.readings import Fix
-from logger.service.timebase import DAY_US, Timebase
+from logger.service.timebase import Timebase
+from logger.units import DAY_US
 
 NOON_US = int(datetime(2026, 7, 4, 12, 0, 0, tzinfo=UTC).timestamp()) * 1_000_000
 BOOT_US = 500_000_000

@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from logger.comfort.iso2631 import comfort_word
-from logger.geodesy import ground_distance_m
+from logger.geodesy import apart_m
 from logger.records import WindowRecord
 from logger.roads.iso8608 import iri_class
 from logger.service.pipeline import longest_wait_us
@@ -56,8 +56,12 @@ Pair = tuple[WindowRecord, WindowRecord]
 Measure = Callable[[WindowRecord, WindowRecord], float | None]
 
 
-def _of(attribute: str) -> Measure:
-    return lambda wanted, found: _apart(getattr(wanted, attribute), getattr(found, attribute))
+def _of(attribute: str, per: float = 1.0) -> Measure:
+    """The difference of a column, ``per`` so much of its own unit."""
+    def measure(wanted: WindowRecord, found: WindowRecord) -> float | None:
+        apart = _apart(getattr(wanted, attribute), getattr(found, attribute))
+        return None if apart is None else apart / per
+    return measure
 
 
 def _apart(wanted: float | None, found: float | None) -> float | None:
@@ -67,38 +71,27 @@ def _apart(wanted: float | None, found: float | None) -> float | None:
     return inf if wanted is None or found is None else abs(found - wanted)
 
 
-def _time_of(attribute: str) -> Measure:
-    def measure(wanted: WindowRecord, found: WindowRecord) -> float | None:
-        apart_us = _apart(getattr(wanted, attribute), getattr(found, attribute))
-        return None if apart_us is None else apart_us / US_PER_S
-    return measure
-
-
 def _length_m(row: WindowRecord) -> float | None:
     return None if row.distance_end_m is None or row.distance_start_m is None \
         else row.distance_end_m - row.distance_start_m
 
 
-def _contradicts(said: str, meant: str) -> float:
-    return 0.0 if said == meant else inf
-
-
 def _comfort_contradicts(_wanted: WindowRecord, found: WindowRecord) -> float:
-    if "hidden" in found.flags:
-        return 0.0 if found.comfort in (LEAST_WORD, "") else inf
-    return _contradicts(found.comfort, comfort_word(found.a_w_mps2) if found.a_w_mps2 is not None else "")
+    word = comfort_word(found.a_w_mps2) if found.a_w_mps2 is not None else ""
+    return 0.0 if found.comfort in ((LEAST_WORD, "") if "hidden" in found.flags else (word,)) else inf
 
 
 def _class_contradicts(_wanted: WindowRecord, found: WindowRecord) -> float:
-    return _contradicts(found.iri_class, iri_class(found.iri_m_per_km) if found.iri_m_per_km is not None else "")
+    word = iri_class(found.iri_m_per_km) if found.iri_m_per_km is not None else ""
+    return 0.0 if found.iri_class == word else inf
 
 
 def _place_apart_m(wanted: WindowRecord, found: WindowRecord) -> float | None:
     """On the ground. None: neither side knows; infinite: one side does."""
-    if wanted.lat_deg is None or wanted.lon_deg is None or found.lat_deg is None or found.lon_deg is None:
-        known = (wanted.lat_deg, wanted.lon_deg, found.lat_deg, found.lon_deg)
-        return None if known == (None,) * len(known) else inf
-    return ground_distance_m(wanted.lat_deg, wanted.lon_deg, found.lat_deg, found.lon_deg)
+    if {wanted.lat_deg, wanted.lon_deg, found.lat_deg, found.lon_deg} == {None}:
+        return None
+    ground_m = apart_m(wanted, found)
+    return inf if ground_m is None else ground_m
 
 
 @dataclass(frozen=True)
@@ -130,8 +123,8 @@ def _scaled(quantity: str, unit: str, why: str, share: float, column: str, least
 _COMFORT = (("a_w", "a_w", "m/s2", "mps2"), ("MTVV", "mtvv", "m/s2", "mps2"), ("VDV", "vdv", "m/s1.75", "mps175"))
 
 TOLERANCES = (
-    RowTolerance("start", "s", 0.03, "three steps of the sample grid", _time_of("t_us")),
-    RowTolerance("UTC", "s", 0.1, "what adapters may delay the first bytes of a fix by", _time_of("utc_us")),
+    RowTolerance("start", "s", 0.03, "three steps of the sample grid", _of("t_us", per=US_PER_S)),
+    RowTolerance("UTC", "s", 0.1, "what adapters may delay the first bytes of a fix by", _of("utc_us", per=US_PER_S)),
     RowTolerance("duration", "s", 0.05, "a start and an end", _of("duration_s")),
     RowTolerance("distance", "m", 0.75, "where a drive is cut by time, 0.03 s at 25 m/s", _of("distance_start_m")),
     RowTolerance("length", "m", 0.75, "as the distance",

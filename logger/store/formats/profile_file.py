@@ -115,11 +115,15 @@ class ErdFile:
         raise BadInput(f"{self.place}: expected one channel, or one named left and one named right, found {names}")
 
     def _unit_m(self, channel: int) -> float:
-        unit_m = _UNITS_M.get(self.units[channel].lower().rstrip("."))
-        if unit_m is None:
-            raise BadInput(f"{self.place}: expected elevations in m, mm, ft or in, found {shown(self.units[channel])} "
-                           f"for channel {channel + 1} (UNITSNAM)")
-        return unit_m
+        return _metres(self.units[channel], f"{self.place}: expected elevations in", f" for channel {channel + 1} "
+                       "(UNITSNAM)")
+
+
+def _metres(unit: str, expected: str, where: str = "") -> float:
+    """What one of a unit is [m]. BadInput for an unknown one."""
+    if (unit_m := _UNITS_M.get(unit.lower().rstrip("."))) is None:
+        raise BadInput(f"{expected} m, mm, ft or in, found {shown(unit)}{where}")
+    return unit_m
 
 
 def is_erd(data: bytes) -> bool:
@@ -210,10 +214,7 @@ class _Header:
     def step_unit_m(self) -> float:
         """Metres per unit of the step."""
         line, text = self._texts.get("XUNITS", (2, ""))
-        unit_m = _UNITS_M.get(text.strip().lower().rstrip("."))
-        if unit_m is None:
-            raise BadInput(f"{self._file}:{line}: expected XUNITS m, mm, ft or in, found {shown(text.strip())}")
-        return unit_m
+        return _metres(text.strip(), f"{self._file}:{line}: expected XUNITS")
 
     def labels(self, keyword: str, width: int, count: int) -> tuple[str, ...]:
         """One text per channel, in columns of this width or parted by blanks; () without the keyword."""

@@ -21,7 +21,7 @@ import numpy as np
 
 from drivers.readings import STANDARD_GRAVITY_MPS2
 from logger.arrays import Array, Bools
-from logger.bounds import SIGNAL
+from logger.bounds import LONGEST_HOLE_S, SIGNAL
 from logger.dsp import repeated_samples
 from logger.errors import BadInput
 from logger.files import file_in, read_bounded
@@ -36,7 +36,6 @@ UNITS = ("mps2", "g")
 OWN_RATE = 0.0
 LEAST_RATE_HZ = 100.0
 MOST_RATE_HZ = 10_000.0
-WIDEST_STEP_S = 0.5
 _MOVING_MPS = 3.0
 _HOLES = 0.02  # of the time
 
@@ -152,8 +151,8 @@ def hold_doubts(t_s: Array, held: Bools, file: str) -> list[Doubt]:
         raise BadInput(f"{file}: expected every sample to be a new measurement, found {share:.0%} that repeat the one "
                        f"before ({(~held).sum() / (t_s[-1] - t_s[0]):.3g} Hz written at {_rate_hz(t_s):.4g}): record "
                        "at a higher rate")
-    if lasted_s[row] > WIDEST_STEP_S:
-        raise BadInput(f"{place(file, int(first[row]))}: expected no hole above {WIDEST_STEP_S:g} s, found a sensor "
+    if lasted_s[row] > LONGEST_HOLE_S:
+        raise BadInput(f"{place(file, int(first[row]))}: expected no hole above {LONGEST_HOLE_S:g} s, found a sensor "
                        f"that stands still on all axes from {begin_s[row]:.6g} to {end_s[row]:.6g} s: cut the record "
                        "there")
     total_s = float(lasted_s.sum())
@@ -206,9 +205,9 @@ def _resampled(t_s: Array, samples: Array, names: Mapping[str, Array], others: M
         taken_s, taken = times_s[~held], samples[~held]
     steps = np.diff(taken_s)
     widest_s = float(steps.max()) if len(steps) else 0.0
-    if widest_s > WIDEST_STEP_S:
+    if widest_s > LONGEST_HOLE_S:
         row = int(np.searchsorted(times_s, taken_s[int(np.argmax(steps)) + 1]))
-        raise BadInput(f"{place(file, row)}: expected no hole above {WIDEST_STEP_S:g} s, found one of "
+        raise BadInput(f"{place(file, row)}: expected no hole above {LONGEST_HOLE_S:g} s, found one of "
                        f"{widest_s:.4g} s: cut the record there")
     if len(steps) < 2:
         raise BadInput(f"{file}: expected three samples or more, found {len(taken_s)}")
@@ -274,7 +273,7 @@ def still_doubts(names: Iterable[str], t_s: Array, samples: Array, held: Bools) 
     times, do not; and a beginning in which none moves: a parked car or a sensor that was not read."""
     doubts = []
     begin_s = repeated_samples.still_until_s(t_s, samples) - t_s[0]
-    if begin_s > WIDEST_STEP_S and not held[1] and np.ptp(samples, axis=0).any():
+    if begin_s > LONGEST_HOLE_S and not held[1] and np.ptp(samples, axis=0).any():
         doubts.append(Doubt("held", f"the sensor stands still on all axes for the first {begin_s:.3g} s: a parked car, "
                             "or it was not read; the ride after it is harder than the values say: cut it off",
                             {"seconds": float(begin_s), "places": 1}))
@@ -287,7 +286,7 @@ def still_doubts(names: Iterable[str], t_s: Array, samples: Array, held: Bools) 
         alone = (repeated_samples.find_holds(t_s, values[:, None]) & ~held if len(samples.T) > 1
                  else np.zeros(0, dtype=np.bool_))
         first, end = repeated_samples.stretches_of(alone)
-        long = t_s[end - 1] - t_s[first - 1] > WIDEST_STEP_S if len(first) else np.zeros(0, dtype=np.bool_)
+        long = t_s[end - 1] - t_s[first - 1] > LONGEST_HOLE_S if len(first) else np.zeros(0, dtype=np.bool_)
         if long.any():
             lasts_s = float((t_s[end - 1] - t_s[first - 1])[long].sum())
             doubts.append(

@@ -24,7 +24,6 @@ VERTICAL = "accel_z_mps2"
 USABLE = "usable"
 HORIZONTAL = ("accel_x_mps2", "accel_y_mps2")
 MAX_BYTES = 1024 * 1024 * 1024
-_ROUNDING_STEPS = 0.2
 HOLE_STEPS = 2.5  # Longer than so many steps is a hole: more than one sample is lost
 _HEADER = f"a header with {TIME},{VERTICAL}[,{','.join(HORIZONTAL)}], each once"
 
@@ -136,4 +135,4 @@ def _tolerance_s(step_s: float) -> float:
     # A time printed with three decimals is up to half a millisecond off, and so are the ends that the grid is laid
     # between.
     rounding_s = 0.00101
-    return min(rounding_s, _ROUNDING_STEPS * step_s)
+    return min(rounding_s, bounds.ROUNDING_STEPS * step_s)
