@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from enum import Enum
 
 import numpy as np
 
@@ -19,9 +20,6 @@ BY_ROAD, BY_RECEIVER = "road", "receiver"
 """By what the places of a run were found (``RecordFacts.places_by``)."""
 SKIP_S = 2.0
 """How much of the beginning of a run is left out of fits and errors, as the car's past is not known [s]."""
-PART_SKIP_S = 0.1
-"""The same of a part that its bench moves: it remembers no more than a damper on its mount does (2 kN s/m on 2e5 N/m:
-10 ms; a judgement) [s]."""
 EVEN_SAMPLES = 1e-3
 """A time within so many samples of one is at that sample: rates are read off times that were rounded."""
 RECEIVER_ERROR_LASTS_S = 60.0
@@ -301,14 +299,9 @@ class Run:
         return self.track.timed
 
     @property
-    def begins_freely(self) -> bool:
-        """Whether the state in which it begins is one of its unknowns."""
-        return begins_freely(self.track)
-
-    @property
-    def is_of_part(self) -> bool:
-        """Whether it is of a part that its bench moves."""
-        return moves_part(self.track)
+    def past(self) -> Past:
+        """What nobody recorded of it."""
+        return past_of(self.track)
 
     @property
     def at_rest(self) -> bool:
@@ -321,14 +314,25 @@ def are_on_rig(runs: Sequence[Run]) -> bool:
     return all(run.timed for run in runs)
 
 
-def begins_freely(track: Track | Excitation | None) -> bool:
-    """Whether the state in which a run begins is one of its unknowns: that of a rig which nothing drives."""
-    return isinstance(track, Excitation) and track.is_still
+class Past(Enum):
+    """What was before a run's first sample, and by its value how much of the run's beginning is left out for it [s].
+
+    DRIVEN     a road or a rig moved the car, whose state at the first sample fades away
+    OF_PART    a bench moved the ends of a part: it remembers no more than a damper on its mount does (2 kN s/m on
+               2e5 N/m: 10 ms; a judgement), and what its laws remember is found with the rest
+    FREE       nothing drives it from there on: the state in which it begins is found with the rest
+    """
+
+    DRIVEN = SKIP_S
+    OF_PART = 0.1
+    FREE = 0.0
 
 
-def moves_part(track: Track | Excitation | None) -> bool:
-    """Whether it moves the ends of a part on its bench."""
-    return isinstance(track, Excitation) and track.moves_part
+def past_of(track: Track | Excitation | None) -> Past:
+    """The past of a run over this road, or on this rig."""
+    if not isinstance(track, Excitation):
+        return Past.DRIVEN
+    return Past.OF_PART if track.moves_part else Past.FREE if track.is_still else Past.DRIVEN
 
 
 def zero_is_known(main: Signal, track: Track | Excitation | None) -> bool:
@@ -336,13 +340,6 @@ def zero_is_known(main: Signal, track: Track | Excitation | None) -> bool:
     the zero of their sensor has nothing to do with what stands on springs or is let go."""
     on_rig = isinstance(track, Excitation) and main.measures == "acceleration"
     return main.measures not in ("displacement", "travel") and not on_rig
-
-
-def unknown_past_s(track: Track | Excitation | None) -> float:
-    """How much of the beginning of a run over this road, or on this rig, is left out: ``SKIP_S``, ``PART_SKIP_S``, and
-    nothing where the state that it begins in is found with the rest."""
-    return PART_SKIP_S if moves_part(track) else (
-        0.0 if begins_freely(track) else SKIP_S)
 
 
 def normalised_rms_error(runs: Sequence[Run], predictions: Sequence[Array]) -> float:

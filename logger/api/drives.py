@@ -39,7 +39,7 @@ from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.question import Notify, function, silent
 from logger.report.quantities import known
-from logger.runs import SKIP_S, UNKNOWN, begins_freely
+from logger.runs import SKIP_S, UNKNOWN, Past, past_of
 from logger.runs import Run as Record
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats import drive_file, vehicle_file
@@ -119,7 +119,7 @@ def run_on_road(given: Run | Path | str, notify: Notify = silent) -> Run:
     if run.track is None:
         raise BadInput(f"{run.path}: expected a run with the profile that it was driven on, or its excitation "
                        f"({drive_file.PROFILE} or {drive_file.EXCITATION})")
-    return _let_go(run, notify) if begins_freely(run.track) else run
+    return _let_go(run, notify) if past_of(run.track) is Past.FREE else run
 
 
 def _let_go(run: Run, notify: Notify) -> Run:

@@ -22,7 +22,7 @@ from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.question import function
 from logger.report.quantities import numbers_of, unit_of
-from logger.runs import moves_part
+from logger.runs import Past, past_of
 from logger.service.signal_chain import recorder_gain
 from logger.shipped import vehicle_names, vehicle_path
 from logger.store.formats import effect_file, vehicle_file
@@ -194,7 +194,7 @@ def check_forces(vehicle: Vehicle, track: Track | Excitation, said: str) -> None
     """BadInput where a force, ``said`` in this file, acts on a part that the vehicle does not have, or what is moved is
     not what this vehicle is moved by."""
     part = vehicle.model == "component"
-    if part != (moves_part(track)):
+    if part != (past_of(track) is Past.OF_PART):
         raise BadInput(f"{Path(said).parent}: expected an excitation.csv with " + (
             "t_s,displacement_m, as the vehicle is a part that its bench moves" if part else
             f"elevation_m or forces, found displacement_m, which moves a part alone: the vehicle is a "

@@ -26,7 +26,7 @@ from logger.identification.noise_models import Autoregressive, NoiseModel, RoadN
 from logger.identification.prediction_error_fit import Fit, FitOptions, fit, spread_starts
 from logger.identification.unknown_inputs import EACH, RoadInput, expanded
 from logger.identification.unknown_road.road_operator import RoadDrive
-from logger.runs import READING, SENSOR, Run, normalised_rms
+from logger.runs import READING, SENSOR, Past, Run, normalised_rms
 from logger.vehicle.effect import Chosen
 from logger.vehicle.named_parameters import Free
 from logger.vehicle.vehicle import OWN_NAMES, Vehicle
@@ -134,7 +134,7 @@ def drive_model(vehicle: Vehicle, effects: Sequence[Chosen], parameters: Sequenc
                 road: RoadInput) -> DriveModel:
     """The model of these drives: in frequency where a car without effects drove, or stood on a rig that elevations
     alone moved, and its acceleration was measured. ValueError as ``DriveModel``."""
-    benches = any(one.facts.main.name != SENSOR or one.begins_freely
+    benches = any(one.facts.main.name != SENSOR or one.past is Past.FREE
                   or one.track.acts_on for one in records)
     if effects or benches or vehicle.model in OWN_NAMES:
         return SimulatedModel(vehicle, parameters, records, road, effects)

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -46,7 +47,7 @@ from logger.lab.selection.holdout import AS_FILED, REFITTED, ErrorStep, HoldOut,
 from logger.lab.selection.screening import Baseline, Screened, misalignment
 from logger.lab.selection.starts import UnknownNumbers
 from logger.lab.selection.stepwise import MeasuredRoad, Search, SearchEffort, Selection, is_outside_data
-from logger.runs import BY_ROAD, are_on_rig
+from logger.runs import BY_ROAD, Past, are_on_rig
 from logger.vehicle import named_parameters
 from logger.vehicle.effect import Chosen, Effect, SensorEffect
 from logger.vehicle.named_parameters import free_parameters_of
@@ -196,8 +197,10 @@ class LabDiagnosis:
 
 
 def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
-             progress: Progress = lambda words: None) -> LabDiagnosis:
-    """Find the effects of ``effects`` that the model, with those that are ``present``, lacks.
+             progress: Progress = lambda words: None, last: Mapping[str, Effect] = MappingProxyType({})
+             ) -> LabDiagnosis:
+    """Find the effects of ``effects`` that the model, with those that are ``present``, lacks; where these leave
+    something unexplained, also of those that are tried ``last``.
 
     ValueError where the vehicle lacks what an effect needs.
     """
@@ -207,7 +210,16 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
         progress("the records were filtered forwards and backwards: searching below that frequency")
         posterior = below
         search, selection = search_effects(posterior, effects, present, progress)
-    return assess(posterior, effects, present, search, selection)
+    found = assess(posterior, effects, present, search, selection)
+    tried = {name: one for name, one in last.items() if name not in obstacles_of(posterior, last, present)}
+    if not (found.exceeds_noise and tried):
+        return found
+    progress(f"something is left unexplained: searching with {' and '.join(tried)}, too")
+    search, selection = search.with_more(selection, [*tried.values()])
+    if not {*selection.gains} & {*tried}:
+        return found
+    more = assess(posterior, {**effects, **last}, present, search, selection)
+    return more if {*more.verdict} & {*tried} else found
 
 
 def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
@@ -320,7 +332,7 @@ def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: S
             why = f"no {' or '.join(sorted({one.kind or f'sensor of {one.measures}' for one in sensors}))} has it"
         if why is None and all(one.measures in effect.found_of for one in sensors):
             why = f"of a {' or '.join(sorted({one.measures for one in sensors}))} it is always estimated"
-        if why is None and isinstance(effect, SensorEffect) and all(run.begins_freely for run in runs):
+        if why is None and isinstance(effect, SensorEffect) and all(run.past is Past.FREE for run in runs):
             why = "nothing drives the run: another initial state would look the same as this sensor effect"
         if why is None and effect.against_ground and at_rest:
             why = "its base is at rest, so a force against the ground equals one against the base"

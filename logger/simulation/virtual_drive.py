@@ -14,7 +14,8 @@ from logger.arrays import Array
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track, WheelTracks
 from logger.roads.obstacles import OBSTACLES
-from logger.runs import ACCELERATION, READING, SENSOR, Run, Signal, zero_is_known
+from logger.runs import ACCELERATION, SENSOR, Run, Signal, zero_is_known
+from logger.simulation.beginning import Beginning, beginning, begins_unknown
 from logger.vehicle.compose import MOST_MPS2, Car, Response, bounded, fine_outputs, recorded, respond, stepper_of
 from logger.vehicle.models import structure_of
 from logger.vehicle.modes import modes, undamped_frequencies_hz, vibrating
@@ -170,14 +171,14 @@ class SimulatedRuns:
                    ) -> list[Beginning | None]:
         """How the runs begin with this car whose initial state nobody knows; None of the others."""
         with np.errstate(over="ignore", invalid="ignore"):
-            return [_beginning(car, passage, run) if _begins_unknown(car, run) else None for run, passage in zip(
-                self.runs, self._unbegun(car, distance_error_m, rough), strict=True)]
+            return [beginning(car, passage, run, _recorded) if begins_unknown(car, run) else None
+                    for run, passage in zip(self.runs, self._unbegun(car, distance_error_m, rough), strict=True)]
 
     def _passages_of(self, car: Car, distance_error_m: Sequence[Array] | None, rough: bool = False,
                      tracks: Sequence[WheelTracks] | None = None, near: Sequence[Beginning | None] | None = None
                      ) -> list[Passage]:
         passages = self._unbegun(car, distance_error_m, rough, tracks)
-        return [passage.begun_with(_beginning(car, passage, run, one).state) if _begins_unknown(car, run)
+        return [passage.begun_with(beginning(car, passage, run, _recorded, one).state) if begins_unknown(car, run)
                 else passage
                 for run, passage, one in zip(self.runs, passages, near or [None] * len(passages), strict=True)]
 
@@ -190,7 +191,7 @@ class SimulatedRuns:
             distance = run.distance_m if distance_error_m is None else run.distance_m + distance_error_m[index]
             distance = car.driven(distance)
             track: WheelTracks = run.track if tracks is None else tracks[index]
-            is_free = _begins_unknown(car, run)
+            is_free = begins_unknown(car, run)
             key = fine_hz, distance.tobytes(), track, is_free
             passage = self._passages[index].get(key)  # another thread may put others in its place at any time
             if passage is None:
@@ -199,130 +200,6 @@ class SimulatedRuns:
                 self._passages[index] = dict(kept) | {key: passage}
             found.append(passage)
         return found
-
-
-def _begins_unknown(car: Car, run: Run) -> bool:
-    """Whether the initial state of a run matters: of what nothing drives, or of a part with a memory."""
-    return run.begins_freely or (run.is_of_part and car.memories > 0)
-
-
-@dataclass(frozen=True, eq=False)
-class Beginning:
-    """The state (2 n + k,) in which a run begins, as ``Passage.begins``, and how what its signals record changes with
-    it (m, 2 n + k)."""
-
-    state: Array
-    columns: Array
-
-
-_STATE_STEP, _MOST_STATE_STEPS = 1e-3, 12
-_STATE_CLOSE = 1e-3  # the last step: what is left after it is of the size of its square
-_UNSEEN, _SMALL_STATE = 1e-4, 1e-6
-
-
-def _beginning(car: Car, passage: Passage, run: Run, near: Beginning | None = None) -> Beginning:
-    """The state with which the car's records come nearest to what the run measured; the search for it begins at that of
-    a car that hardly differs (``near``), where there is one.
-
-    Problem: what is pulled and let go, or was struck before its record begins, is in a state that nobody wrote down,
-    and so is a part with a memory, which came to its first sample from above or from below; every number of the car
-    that is tried has its own best one. Solution: the state is eliminated wherever the run is predicted (variable
-    projection: G. Golub and V. Pereyra, SIAM J. Numer. Anal. 10, 1973). The records of a linear car are linear in it,
-    so that one solution of least squares finds it; from there Gauss-Newton steps lead to that of a car whose laws are
-    bent. Each signal counts by its own size, and its zero is free. What the record does not show of the state stays at
-    rest: memories have a normal prior of one unit of their law, which for friction is that it slides.
-    """
-    if car.structure.held:
-        run, passage = _one_cycle(car, passage, run)
-    weighed = _WeighedRecord(run)
-    wanted, plain = weighed.measured, car.linear
-    passage.under_wheels(passage.driven(car.structure))  # asked for once, for all states
-    moves, count = 2 * len(car.structure.mass), 2 * len(car.structure.mass) + car.memories
-    columns, state, usual = np.zeros((len(wanted), count)), np.zeros(count), np.ones(count)
-    if car.structure.held or not len(wanted):
-        usual[:moves] = 0.0  # the bench moves it
-    else:
-        still = weighed.of(plain, passage)
-        # Small, as records are clipped at what no sensor reads: 1 m is that of what is let go at 160 Hz.
-        small = passage.begun_in_each(_SMALL_STATE * np.eye(moves))
-        columns[:, :moves] = np.stack([weighed.of(plain, one) - still for one in small], axis=1) / _SMALL_STATE
-        seen = np.linalg.norm(columns[:, :moves], axis=0)
-        usual[:moves] = np.divide(np.linalg.norm(wanted), seen, out=np.zeros_like(seen), where=seen > 0)
-        state = _towards(columns, wanted - still, usual, state, moves)
-    if not car.bends_laws or not len(wanted):
-        return Beginning(state, columns)
-    if near is not None and len(near.state) == count:  # what hangs on it has a state as soon as it weighs something
-        return _bent_beginning(car, passage, weighed, usual, moves, near, True)
-    return _bent_beginning(car, passage, weighed, usual, moves, Beginning(state, columns), False)
-
-
-def _bent_beginning(car: Car, passage: Passage, weighed: _WeighedRecord, usual: Array, moves: int, start: Beginning,
-                    is_near: bool) -> Beginning:
-    """The beginning with a car whose laws are bent, by Gauss-Newton steps, the first of them by the columns of one that
-    ``is_near``."""
-    state, columns, own = start.state, start.columns.copy(), not is_near
-    here = weighed.of(car, passage.begun_with(state))
-    for _ in range(_MOST_STATE_STEPS):
-        for index, one in enumerate(_STATE_STEP * usual * own):
-            if one > 0:
-                beside = passage.begun_with(state + one * (np.arange(len(usual)) == index))
-                columns[:, index] = (weighed.of(car, beside) - here) / one
-        way = _towards(columns, weighed.measured - here, usual, state, moves)
-        least, share = weighed.misfit(here, state[moves:]), 0.0
-        for share in (1.0, 0.5, 0.25, 0.1, 0.02, 0.0):
-            there = weighed.of(car, passage.begun_with(state + share * way))
-            if weighed.misfit(there, (state + share * way)[moves:]) < least:
-                break
-        state, here = state + share * way, there
-        if own and (np.abs(share * way) <= _STATE_CLOSE * usual).all():
-            break
-        own = True
-    return Beginning(state, columns)
-
-
-def _one_cycle(car: Car, passage: Passage, run: Run) -> tuple[Run, Passage]:
-    """The beginning of a run of a part: after it has moved through its stroke and back, what it remembered is gone."""
-    places = passage.under_wheels(car.structure)[0][: run.count * passage.steps, 0]
-    gone = np.searchsorted(np.cumsum(np.abs(np.diff(places))), 2 * np.ptp(places)) // passage.steps
-    count = max(int(gone), 2 * run.first) + 2
-    return run.cut(count), passage.cut(count)
-
-
-def _towards(columns: Array, left: Array, usual: Array, state: Array, moves: int) -> Array:
-    """The change of a state (c,) of these ``usual`` sizes that makes up for what is ``left`` (m,), by its ``columns``
-    (m, c); the memories, which follow ``moves`` others, have their prior."""
-    spread = np.sqrt(np.mean(left**2)) or 1.0
-    prior = np.arange(len(state)) >= moves
-    rows = np.vstack([columns * usual, np.diag(spread * prior)])
-    return np.asarray(usual * np.linalg.lstsq(rows, np.concatenate([left, -spread * prior * state]), rcond=_UNSEEN)[0])
-
-
-class _WeighedRecord:
-    """What a run's signals read, joined (m,): each without its mean, by its own size."""
-
-    def __init__(self, run: Run) -> None:
-        self._run = run
-        read = run.read if run.usable is None else run.usable == READING
-        self._counted = read & (np.arange(run.count) >= run.first)
-        measured = np.stack([run.measured_mps2, *run.more])[:, self._counted]
-        self._sizes = measured.std(axis=1, keepdims=True) if self._counted.any() else np.ones((len(measured), 1))
-        self._sizes[self._sizes == 0] = 1.0
-        self.measured = self._weighed(measured)
-
-    def of(self, car: Car, begun: Passage) -> Array:
-        """What a car would have read in their place."""
-        joined = self._run.in_band(_recorded(car, begun, self._run))
-        return self._weighed(joined.reshape(-1, self._run.count)[:, self._counted])
-
-    def misfit(self, predicted: Array, memories: Array) -> float:
-        """Minus twice the log-likelihood of what was predicted (m,), with noise of any level, and of memories (k,)."""
-        squares = np.sum((self.measured - predicted) ** 2) + np.finfo(float).tiny
-        return len(predicted) * float(np.log(squares)) + float(memories @ memories)
-
-    def _weighed(self, samples: Array) -> Array:
-        if not samples.size:
-            return np.empty(0)
-        return np.asarray((samples - samples.mean(axis=1, keepdims=True)) / self._sizes).ravel()
 
 
 def _recorded(car: Car, passage: Passage, run: Run) -> Array:

@@ -61,7 +61,7 @@ from logger.question import function
 from logger.report.quantities import known as known_number
 from logger.report.quantities import measured, unit_of
 from logger.runs import Run as Record
-from logger.runs import runs_left_out, unknown_past_s, zero_is_known
+from logger.runs import past_of, runs_left_out, zero_is_known
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats import vehicle_file
 from logger.store.formats.drive_file import DRIVE, RUN
@@ -197,7 +197,7 @@ def _records(drives: Sequence[Run], question: IdentifyQuestion, vehicle: Vehicle
     rates that differ."""
     records = []
     for drive in drives:
-        lasts_s, past_s = len(drive.time_s) / drive.rate_hz, unknown_past_s(drive.track)
+        lasts_s, past_s = len(drive.time_s) / drive.rate_hz, past_of(drive.track).value
         if not lasts_s - LEAST_SAMPLES / drive.rate_hz > past_s:
             raise BadInput(f"{drive.path}: expected {LEAST_SAMPLES} samples or more after the first {past_s:g} s, "
                            f"which are left out, found a drive of {lasts_s:g} s")

@@ -118,11 +118,7 @@ class Bench:
         effects = {name: effect for name, effect in self.effects.items() if name not in left_out}
         last = {name: effect for name, effect in self.last.items() if name not in left_out}
         with self.blamed():
-            found = diagnose(self.posterior(searches=True), effects, self.model.effects, notify)
-            if found.exceeds_noise and last:
-                notify(f"something is left unexplained: searching with {' and '.join(last)}, too")
-                more = diagnose(self.posterior(searches=True), {**effects, **last}, self.model.effects, notify)
-                found = more if {*more.verdict} & {*last} else found
+            found = diagnose(self.posterior(searches=True), effects, self.model.effects, notify, last)
             if found.verdict or not (found.beyond and found.exceeds_noise) or not self.timed:
                 return found
             notify("the runs contradict the vehicle's file: searching with its numbers unknown")

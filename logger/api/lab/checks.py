@@ -47,11 +47,10 @@ from logger.runs import (
     NO_READING,
     READING,
     SKIP_S,
+    Past,
     Run,
     Signal,
-    begins_freely,
-    moves_part,
-    unknown_past_s,
+    past_of,
     zero_is_known,
 )
 from logger.simulation.virtual_drive import SimulatedRuns, steps_hz
@@ -263,7 +262,7 @@ def _other_roads(runs: SimulatedRuns, followed: _Followed, car: Car) -> Iterator
         strangers = list(range(len(followed.around)))
     for k in strangers:
         found, run = followed.around[k], runs.runs[k]
-        if run.begins_freely or (run.timed and _is_coherent(run, car)):
+        if run.past is Past.FREE or (run.timed and _is_coherent(run, car)):
             continue  # nothing drives what is let go, and its mode may lie anywhere
         what = "a record that follows its excitation" if run.timed else "a drive that follows the road of its profile"
         yield (f"{run.name}: expected {what}, found one that does not (correlation {found.correlation:.2f} around the "
@@ -429,7 +428,7 @@ def driven_stretches(drive: DriveOnRoad) -> list[Run]:
     return [Run(str(drive.path) if whole else
                 f"{drive.path} ({drive.time_s[part.start]:.0f} to {drive.time_s[part.stop - 1]:.0f} s)",
                 drive.rate_hz, main(part), drive.distance_m[part], drive.speed_mps[part],
-                drive.track.begun(part.start / drive.rate_hz), unknown_past_s(drive.track), facts=drive.facts,
+                drive.track.begun(part.start / drive.rate_hz), past_of(drive.track).value, facts=drive.facts,
                 usable=drive.marks(part), more=_more(drive, part), cut_s=cut_s if part is parts[0] else 0.0)
             for part in parts]
 
@@ -438,16 +437,16 @@ def least_s(drive: Drive, vehicle: Vehicle | None = None) -> float:
     """How long a drive, or a test of a part, has to be; of a rig that nothing drives three periods of the vehicle's
     slowest vibration, or what there is where that is not known [s]."""
     track = getattr(drive, "track", None)
-    if begins_freely(track):
+    if past_of(track) is Past.FREE:
         slowest_hz = 0.0 if vehicle is None else float(undamped_frequencies_hz(structure_of(vehicle))[0])
         return min(_LEAST_PERIODS / slowest_hz, LEAST_S) if slowest_hz else 0.0
-    return _LEAST_OF_PART_S if moves_part(track) else LEAST_S
+    return _LEAST_OF_PART_S if past_of(track) is Past.OF_PART else LEAST_S
 
 
 def check_decay(drive: Drive, file: Path) -> None:
     """Raise BadInput for a record that does not die down, of a run that nothing drives: what little damps does so from
     swing to swing, though its second half is hardly less than the first."""
-    if begins_freely(getattr(drive, "track", None)):
+    if past_of(getattr(drive, "track", None)) is Past.FREE:
         half = len(drive.accel_z_mps2) // 2
         first, last = (float(part.std()) for part in (drive.accel_z_mps2[:half], drive.accel_z_mps2[half:]))
         if last > _DIES_DOWN * first and not _swings_shrink(drive.accel_z_mps2):
@@ -597,7 +596,7 @@ def check_record(drive: Drive, file: Path, others: Sequence[Drive], vehicle: Veh
     """Raise BadInput for a drive of fewer samples a second than what is looked at needs, that is too short, has
     another rate than the others, recorded nothing, or repeats samples."""
     track = getattr(drive, "track", None)
-    past_s, shortest_s = unknown_past_s(track), least_s(drive, vehicle)
+    past_s, shortest_s = past_of(track).value, least_s(drive, vehicle)
     check_rate(drive, file, vehicle)
     lasts_s = len(drive.time_s) / drive.rate_hz
     if lasts_s < shortest_s:
@@ -616,7 +615,8 @@ def check_record(drive: Drive, file: Path, others: Sequence[Drive], vehicle: Veh
     if is_acceleration and counted.std() < _RUN_CHECKS_LEAST_MPS2:
         raise BadInput(f"{file}: expected accelerations in m/s2, found none above {np.abs(counted).max():.2g}")
     # Three periods of what rings loudly have a mean of their own.
-    if is_acceleration and abs(counted.mean()) > max(_MOST_MEAN_MPS2, counted.std() if begins_freely(track) else 0.0):
+    own_mean_mps2 = counted.std() if past_of(track) is Past.FREE else 0.0
+    if is_acceleration and abs(counted.mean()) > max(_MOST_MEAN_MPS2, own_mean_mps2):
         raise BadInput(f"{file}: expected gravity to be removed, found {counted.mean():.3g} m/s2 on average")
     # What was laid across gaps is on no step of a coarse sensor, and one at the end of its range rightly stays there.
     read = drive.accel_z_mps2 if drive.usable is None else drive.accel_z_mps2[drive.usable == READING]

@@ -33,7 +33,7 @@ from logger.profiles.track import Track
 from logger.question import function
 from logger.report import document as doc
 from logger.report.quantities import columns, wrapped
-from logger.runs import Run
+from logger.runs import Past, Run
 from logger.store.formats import drive_file, profile_file, vehicle_file
 
 
@@ -89,7 +89,7 @@ def plan_by(question: PlanQuestion) -> Plan:
         question.profile if isinstance(question.profile, profile_file.Wheelpaths) else read_profile(question.profile))
     if each(question.runs):
         bench = bench_with(question, "ridelog plan")
-        if alone := next((run.name for run in bench.runs.runs if run.begins_freely), None):
+        if alone := next((run.name for run in bench.runs.runs if run.past is Past.FREE), None):
             raise BadInput(f"{alone}: expected a run that something drives, as a plan repeats it: nothing drives this")
     elif not question.speeds_mps:
         raise BadInput("plan: expected a run, or --profile and --speed of a planned drive")

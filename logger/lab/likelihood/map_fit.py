@@ -295,8 +295,7 @@ def effect_slopes(posterior: Posterior, effects: Sequence[Chosen], logs: Array,
              the place is a hundredth of a millimetre off changes all that comes after a blow, and not in proportion.
              None: they are not known
     """
-    car = posterior.car(effects, logs)
-    near = posterior.runs.beginnings(car, posterior.distance_error_m(record), rough=True)
+    near = posterior.beginnings(effects, logs, record)
     predict = partial(posterior.predict, logs=logs, record=record, rough=True, near=near)
     steps = steps_of(effects, free_parameters)
     if white is not None:

@@ -15,7 +15,8 @@ from logger.lab.likelihood.readings import Readings
 from logger.lab.likelihood.signals import bands_of, deviance
 from logger.profiles.excitation import Excitation
 from logger.runs import normalised_rms_error
-from logger.simulation.virtual_drive import Beginning, SimulatedRuns, steps_hz
+from logger.simulation.beginning import Beginning
+from logger.simulation.virtual_drive import SimulatedRuns, steps_hz
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
@@ -122,15 +123,20 @@ class Posterior:
         return [one.with_recorder_error(prediction, k) for one, prediction, k in zip(
             self.record_errors, predictions, record, strict=True)]
 
+    def beginnings(self, effects: Sequence[Chosen], logs: Array, record: Sequence[Array]) -> list[Beginning | None]:
+        """How the runs begin, by a rough simulation, whose initial state nobody knows; None of the others."""
+        return self.runs.beginnings(self.car(effects, logs), self.distance_error_m(record), rough=True)
+
     def predictor(self, state: State) -> Predict:
         """A function that predicts models near a state: by rough simulations, corrected by the difference of a fine and
         a rough one of the state itself."""
         given = state.effects, state.logs, state.record
-        fine = state.predictions or self.predict(*given)
-        off = [one - rough for one, rough in zip(fine, self.predict(*given, rough=True), strict=True)]
+        fine, near = state.predictions or self.predict(*given), self.beginnings(*given)
+        off = [one - rough for one, rough in zip(fine, self.predict(*given, rough=True, near=near), strict=True)]
 
         def predict(effects: Sequence[Chosen], logs: Array, record: Sequence[Array]) -> list[Array]:
-            return [one + more for one, more in zip(self.predict(effects, logs, record, rough=True), off, strict=True)]
+            there = self.predict(effects, logs, record, rough=True, near=near)
+            return [one + more for one, more in zip(there, off, strict=True)]
 
         return predict
 
@@ -186,8 +192,7 @@ class Posterior:
         """Derivatives of the predictions by the logarithms of the car's numbers: (p, n) per run, by differences over
         steps (p,) of rough simulations, which are near enough."""
         error_m = self.distance_error_m(state.record)
-
-        near = self.runs.beginnings(self.car(state.effects, state.logs), error_m, rough=True)
+        near = self.beginnings(state.effects, state.logs, state.record)
 
         def predict(logs: Array) -> list[Array]:
             return self.runs.predict(self.car(state.effects, logs), error_m, rough=True, near=near)

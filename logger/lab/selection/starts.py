@@ -101,7 +101,7 @@ class UnknownNumbers(MeasuredRoad):
 
         found = sorted(pool.map(begun, local), key=_by_gain)
         # Sequential halving: Z. Karnin, T. Koren and O. Somekh, ICML 2013.
-        for best in (len(found) // 2, len(found) // 4):
+        for best in (-(-len(found) // 2), -(-len(found) // 4)):
             found[:best] = pool.map(farther, found[:best])
             found.sort(key=_by_gain)
         return found

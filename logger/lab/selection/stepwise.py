@@ -226,10 +226,14 @@ class MeasuredRoad:
 
 @dataclass(frozen=True, eq=False)
 class SearchRound(Generic[P, F]):
-    """All effects tried on a model: those that were fitted, best first, and the screening of the others."""
+    """All effects tried on a model: those that were fitted, best first, and the screening of the others; on which."""
 
     fits: tuple[F, ...]
     unfitted: tuple[P, ...]
+    on: object = None
+
+
+UNTRIED: SearchRound[Any, Any] = SearchRound((), ())
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,7 +255,7 @@ class Selection(Generic[M, P, F]):
     rivals: dict[str, tuple[str, ...]]
     first: SearchRound[P, F]
     steps: tuple[tuple[str, HoldOut], ...]
-    last: SearchRound[P, F] = SearchRound((), ())
+    last: SearchRound[P, F] = UNTRIED
 
 
 @dataclass(eq=False)
@@ -276,10 +280,11 @@ class Search(Generic[M, P, F]):
 
     def run(self, before: M) -> Selection[M, P, F]:
         """Search on top of a fitted model."""
-        return self.go_on(Selection(before, before, {}, {}, SearchRound((), ()), ()))
+        return self.go_on(Selection(before, before, {}, {}, UNTRIED, ()))
 
-    def go_on(self, begun: Selection[M, P, F]) -> Selection[M, P, F]:
-        """A search that ended because it had found as many effects as it might, with more of them."""
+    def go_on(self, begun: Selection[M, P, F], known: SearchRound[P, F] | None = None) -> Selection[M, P, F]:
+        """A search that ended because it had found as many effects as it might, with more of them; ``known``: the round
+        on the model that it goes on from."""
         before, now, first, steps = begun.before, begun.now, begun.first, list(begun.steps)
         last = begun.last
         while len(now.effects) - self.present < self.effort.effects:
@@ -287,7 +292,8 @@ class Search(Generic[M, P, F]):
             if not untried:
                 break
             self.progress(f"round {len(steps) + 1}")
-            last = tried = self.round(now, untried)
+            last = tried = known or self.round(now, untried)
+            known = None
             first = first if steps else tried
             best = self._simplest(now, tried)
             if best is None and not steps and (under := self._underlaid(now, tried)) is not None:
@@ -305,7 +311,7 @@ class Search(Generic[M, P, F]):
             self._rivals[best.effect.name] = self._rivals_of(now, best.gain, best.effect.name, tried)
             now = self._reconsider(self.likelihood.with_effect(best), best.effect.name, now)
             *earlier, added = names_of(now)[self.present:]
-            last = SearchRound((), ())
+            last = UNTRIED
             steps.append((added, now.hold_out))
             for name in earlier:
                 now = self._reconsider(now, name)
@@ -313,6 +319,22 @@ class Search(Generic[M, P, F]):
         rivals = {name: tuple(one for one in self._rivals.get(name, ()) if one not in gains) for name in gains}
         self._reduced = None
         return Selection(before, now, gains, rivals, first, tuple(steps), last)
+
+    def with_more(self, begun: Selection[M, P, F], more: Sequence[Effect]
+                  ) -> tuple[Search[M, P, F], Selection[M, P, F]]:
+        """A search that has ended, gone on with more effects. These are tried on the model that it began with and on
+        the one that it ended with, and in the place of what it found; what was tried before is not tried again."""
+        wider = replace(self, effects=[*self.effects, *more], _promising=set(), _rivals=dict(begun.rivals))
+        before, now = begun.before, begun.now
+        first = wider.round(before, more, beside=begun.first)
+        best = wider._simplest(before, first)
+        if now is before or (best is not None and best.effect in more):
+            return wider, wider.go_on(Selection(before, before, {}, {}, first, ()), first)
+        for name in names_of(now)[self.present:] if wider._promising else ():
+            now = wider._reconsider(now, name)
+        wider._promising |= self._promising
+        known = wider.round(now, more, beside=begun.last) if begun.last.on is now else None
+        return wider, wider.go_on(replace(begun, now=now, first=first), known)
 
     def _reconsidered(self, now: M, tried: SearchRound[P, F]) -> M:
         """The model with others in the place of its effects, where what is left is within sensors' calibration and an
@@ -343,7 +365,7 @@ class Search(Generic[M, P, F]):
         return replace(found, now=now, gains=gains)
 
     def round(self, now: M, effects: Sequence[Effect], instead_of: Chosen | None = None, base: M | None = None,
-              to_gain: float | None = None) -> SearchRound[P, F]:
+              to_gain: float | None = None, beside: SearchRound[P, F] = UNTRIED) -> SearchRound[P, F]:
         """Every effect tried on a model. Where its distance errors are large, effects that shift runs are also tried
         with the recorded distances: what they do may have been taken for a start or scale error.
 
@@ -355,6 +377,7 @@ class Search(Generic[M, P, F]):
         instead_of    the effect in whose place they are tried; None: in addition
         base          the model on which they are screened; None: this one
         to_gain       gain of that effect; None: what chance may gain
+        beside        a round of others on the same model, which is a part of this one
         """
         effort, base = self.effort, now if base is None else base
         to_gain = min_gain(len(self.effects)) if to_gain is None else to_gain
@@ -369,28 +392,29 @@ class Search(Generic[M, P, F]):
             self.progress(f"fitting {len(worth)} of them")
             tries = self._fit_all_roughly(pool, now.score, worth[:1], 0.0)
             if instead_of is not None or len(names_of(now)) > self.present:
-                to_gain = max(to_gain, self._reached(now, tries))
+                to_gain = max(to_gain, self._reached(now, [*tries, *beside.fits]))
             enough = effort.fit_share * to_gain
             tries += self._fit_all_roughly(pool, now.score, [
                 pair for pair in worth[1:] if _gains_enough(pair[1], enough)], enough)
             rough = _best_of_each(tries)
-            enough = effort.refine_share * max([to_gain, *(one.gain for one in rough)])
+            enough = effort.refine_share * max([to_gain, *(one.gain for one in (*rough, *beside.fits))])
             best = {one.effect.name: one.gain for one in rough if _gains_enough(one, enough)}
             good = [one for one in sorted(tries, key=lambda one: -one.gain)
                     if one.gain > effort.tie_share * best.get(one.effect.name, np.inf)]
-            if len(good) == 1 and instead_of is None and self.is_accepted(now, good[0]):
+            if len(good) == 1 and instead_of is None and beside is UNTRIED and self.is_accepted(now, good[0]):
                 good = []  # the only one: it is fitted in full when it is added
             self.progress(f"refining {len(good)} of them")
             refine = partial(self.likelihood.refined, now, least=effort.round_share * now.explanation)
             fine = list(map(refine, good[:1]))
-            enough = effort.refine_share * self._reached(now, fine)
+            enough = effort.refine_share * self._reached(now, [*fine, *beside.fits])
             good = [*good[:1], *(one for one in good[1:] if one.gain > enough)]
             fine += pool.map(refine, good[1:])
         # A fit that is much worse than the model without the effect has diverged: its screening says more.
-        fits = [one for one in _best_of_each([*fine, *(one for one in rough if one not in good)])
+        fits = [one for one in _best_of_each([*fine, *(one for one in rough if one not in good), *beside.fits])
                 if one.gain > -min_gain(len(self.effects))]
         fitted = {one.effect.name for one in fits}
-        return SearchRound(tuple(fits), tuple(one for one in unfitted if one.effect.name not in fitted))
+        rest = sorted((*unfitted, *beside.unfitted), key=lambda one: -one.gain)
+        return SearchRound(tuple(fits), tuple(one for one in rest if one.effect.name not in fitted), now)
 
     def _may_win(self, base: M, screened: Sequence[P], enough: float) -> list[tuple[M, P]]:
         """The first of some screenings on a model that gain enough."""

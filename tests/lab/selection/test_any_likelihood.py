@@ -148,3 +148,16 @@ def test_what_gains_a_tenth_of_what_is_left_may_only_imitate(to_explain: float, 
     assert ("sensor_offset" in found.gains) == named
     undecided = [one.effect.name for one in found.last.fits if sought.may_imitate(found.now, one)]
     assert undecided == ([] if named else ["sensor_offset"])
+
+
+@pytest.mark.parametrize("later", WORTH)
+def test_a_search_that_goes_on_with_one_more_effect_finds_the_same_and_fits_nothing_twice(later: str) -> None:
+    few = search()
+    few.effects = [one for one in few.effects if one.name != later]
+    begun = few.run(Made())
+    known = len(few.likelihood.fitted)
+    wider, found = few.with_more(begun, [EFFECTS[later]])
+    whole = search().run(Made())
+    assert (found.gains, found.rivals) == (whole.gains, whole.rivals)
+    assert {one.effect.name for one in found.first.fits} == {one.effect.name for one in whole.first.fits}
+    assert [name for name, before in wider.likelihood.fitted[known:] if not before] == [later]
