@@ -25,7 +25,7 @@ Recorded = Callable[[Car, Passage, Run], Array]
 """What a run's signals, joined ((1 + s) n,), would read of a car on a passage."""
 
 _STATE_STEP, _MOST_STATE_STEPS = 1e-3, 12
-_STATE_CLOSE = 1e-3  # the last step: what is left after it is of the size of its square
+_SMALL_GAIN = 0.1  # of minus twice the log-likelihood: what promises less is the last step, a third of a standard error
 _UNSEEN, _SMALL_STATE = 1e-4, 1e-6
 
 
@@ -72,7 +72,8 @@ def _linear_beginning(car: Car, passage: Passage, weighed: _WeighedRecord, count
     if car.structure.held or not len(wanted):
         usual[:moves] = 0.0  # the bench moves it
         return Beginning(state, columns, usual)
-    still = weighed.of(plain, passage)
+    # What nothing drives is still, and each signal counts without its mean.
+    still = np.zeros_like(wanted) if weighed.run.past is Past.FREE else weighed.of(plain, passage)
     # Small, as records are clipped at what no sensor reads: 1 m is that of what is let go at 160 Hz.
     small = passage.begun_in_each(_SMALL_STATE * np.eye(moves))
     columns[:, :moves] = np.stack([weighed.of(plain, one) - still for one in small], axis=1) / _SMALL_STATE
@@ -95,21 +96,22 @@ def _bent_beginning(car: Car, passage: Passage, weighed: _WeighedRecord, start: 
                     columns[:, index] = (weighed.of(car, beside) - here) / one
             own = True
         way = _towards(columns, weighed.measured - here, usual, state, moves)
-        if (np.abs(way) <= _STATE_CLOSE * usual).all():
+        least, gained = weighed.misfit(here, state[moves:]), 0.0
+        if weighed.misfit(here + columns @ way, (state + way)[moves:]) > least - _SMALL_GAIN:
             return Beginning(state + way, columns, usual)
-        least, gains = weighed.misfit(here, state[moves:]), False
         for share in (1.0, 0.5, 0.25, 0.1, 0.02) if fresh else (1.0,):
             step = share * way
             there = weighed.of(car, passage.begun_with(state + step))
-            if gains := weighed.misfit(there, (state + step)[moves:]) < least:
+            gained = least - weighed.misfit(there, (state + step)[moves:])
+            if gained > 0:
                 break
-        if gains:
+        if gained > 0:
             usually = np.divide(step, usual**2, out=np.zeros_like(step), where=usual > 0)
             columns += np.outer(there - here - columns @ step, usually / (usually @ step))
             state, here = state + step, there
-        elif fresh:
+        if fresh and gained < _SMALL_GAIN:
             break
-        own = gains
+        own = gained > 0
     return Beginning(state, columns, usual)
 
 
@@ -134,7 +136,7 @@ class _WeighedRecord:
     """What a run's signals read, joined (m,): each without its mean, by its own size."""
 
     def __init__(self, run: Run, recorded: Recorded) -> None:
-        self._run, self._recorded = run, recorded
+        self.run, self._recorded = run, recorded
         read = run.read if run.usable is None else run.usable == READING
         self._counted = read & (np.arange(run.count) >= run.first)
         measured = np.stack([run.measured_mps2, *run.more])[:, self._counted]
@@ -144,8 +146,8 @@ class _WeighedRecord:
 
     def of(self, car: Car, begun: Passage) -> Array:
         """What a car would have read in their place."""
-        joined = self._run.in_band(self._recorded(car, begun, self._run))
-        return self._weighed(joined.reshape(-1, self._run.count)[:, self._counted])
+        joined = self.run.in_band(self._recorded(car, begun, self.run))
+        return self._weighed(joined.reshape(-1, self.run.count)[:, self._counted])
 
     def misfit(self, predicted: Array, memories: Array) -> float:
         """Minus twice the log-likelihood of what was predicted (m,), with noise of any level, and of memories (k,)."""
