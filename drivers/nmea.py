@@ -192,10 +192,6 @@ class _Epoch:
                    altitude_m=self.gga.altitude_m if self.gga else None, satellites=self.satellites(), hdop=self.hdop(),
                    may_wait=self.may_wait)
 
-    def no_fix(self) -> Fix:
-        """The epoch when nobody vouches for it: only how well the receiver sees the sky."""
-        return Fix(self.t_us, False, None, None, None, None, None, None, None, self.satellites(), self.hdop())
-
     def satellites(self) -> int | None:
         return self.gga.satellites if self.gga else None
 
@@ -363,8 +359,8 @@ class NmeaDecoder:
         if epoch is None:
             return []
         self._epoch, self._zda = None, None
-        if not epoch.valid():
-            return [epoch.no_fix()]
+        if not epoch.valid():  # only how well the receiver sees the sky is taken
+            return [Fix(epoch.t_us, False, None, None, None, None, None, None, None, epoch.satellites(), epoch.hdop())]
         refused = self._refused_dates
         fix = epoch.fix(self._utc_us(epoch, zda))
         is_dated = fix.utc_us is not None or self._refused_dates > refused

@@ -374,7 +374,7 @@ def _drives(recorded: Recorded, measured: MeasuredProfile | None) -> tuple[list[
 
 def _off_the_line(line: along_track.MeasuredLine, driven_m: Array, along_m: Array, aside_m: Array) -> str:
     """Why a drive, by fixes (k,), has no pass over a line."""
-    if along_track.goes_back(driven_m, along_m, aside_m):
+    if along_track.passes(driven_m, -along_m, aside_m):
         return ": the drive goes along the profile from its end to its beginning"
     near = aside_m <= along_track.ASIDE_M
     if not near.any():

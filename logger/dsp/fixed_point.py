@@ -120,13 +120,10 @@ def _flattest(rows: Array) -> Array:
     zeros_gain, poles_gain = np.abs(rows[:, :3] @ powers), np.abs(rows[:, 3:] @ powers)
     free, paired = list(range(len(rows))), rows.copy()
     for poles in np.argsort([-np.abs(np.roots(row[3:])).max(initial=0.0) for row in rows], kind="stable"):
-        unevenness = [_unevenness(zeros_gain[zeros] / poles_gain[poles]) for zeros in free]
+        gains = zeros_gain[free] / poles_gain[poles]
+        unevenness = np.log(gains / gains.max(axis=1, keepdims=True) + _FLOOR).std(axis=1)
         paired[poles, :3] = rows[free.pop(int(np.argmin(unevenness))), :3]
     return paired
-
-
-def _unevenness(gain: Array) -> float:
-    return float(np.std(np.log(gain / gain.max() + _FLOOR)))
 
 
 def _order(rows: Array, impulse: Array) -> tuple[float, list[int]]:

@@ -89,7 +89,8 @@ class Pass:
 
 
 def passes(driven_m: Array, along_m: Array, aside_m: Array) -> list[Pass]:
-    """The passes of a drive, by fixes (k,): how far the car had come, the nearest place of the line, how far aside."""
+    """The passes of a drive, by fixes (k,): how far the car had come, the nearest place of the line, how far aside. By
+    places with their signs turned, those of a drive from the line's end to its beginning."""
     offset_m = along_m - driven_m
     on = aside_m <= ASIDE_M
     together = on[1:] & on[:-1] & (np.abs(np.diff(offset_m)) <= _APART_M)
@@ -99,11 +100,6 @@ def passes(driven_m: Array, along_m: Array, aside_m: Array) -> list[Pass]:
         if last - first + 1 >= _LEAST_FIXES and moved > 2 * _APART_M and np.ptp(offset_m[first : last + 1]) < moved / 2:
             found.append(Pass(int(first), int(last) + 1, float(np.median(offset_m[first : last + 1]))))
     return found
-
-
-def goes_back(driven_m: Array, along_m: Array, aside_m: Array) -> bool:
-    """Whether a drive followed the line from its end to its beginning."""
-    return bool(passes(driven_m, -along_m, aside_m))
 
 
 def _flat(lat_deg: Array, lon_deg: Array, lat0_deg: float, lon0_deg: float) -> tuple[Array, Array]:
@@ -256,18 +252,14 @@ def _fitted(speeds: Observations, places: Observations, walk: float, noise_mps: 
         state = system.solved(rows)[0]
         weights = _without_wild((state[:, 1] - speeds.value) / deviation)
         at = TrackMotion(speeds.time_s, state, walk, noise_mps)
-        seen = _student((at._curve(places.time_s, 0) - places.value) / places.deviation)
+        off = (at._curve(places.time_s, 0) - places.value) / places.deviation
+        seen = np.asarray((_FREEDOM + 1) / (_FREEDOM + off**2))
     return TrackMotion(speeds.time_s, state, walk, noise_mps)
 
 
 def _without_wild(off: Array) -> Array:
     """Weights (k,) of speeds that are off by so many deviations: less the farther they are beyond ``_WILD``."""
     return np.asarray((_WILD / np.maximum(np.abs(off), _WILD)) ** 2)
-
-
-def _student(off: Array) -> Array:
-    """Weights (k,) of what is off by so many deviations."""
-    return np.asarray((_FREEDOM + 1) / (_FREEDOM + off**2))
 
 
 class _System:

@@ -32,15 +32,11 @@ from logger.store.log.row_format import COLUMNS, FLAGS, HEADERS, LATEST_US, scan
 from logger.units import US_PER_S
 
 
-def key_path(dataset: Path) -> Path:
-    """Where the key of a dataset lies: beside its folder, so that the folder can be given away without it."""
-    return dataset.with_name(f"{dataset.name}.key")
-
-
 def own_key(dataset: Path) -> bytes:
-    """The key of a dataset; a new one where there is none. BadInput for one that is damaged."""
+    """The key of a dataset, beside its folder, so that the folder can be given away without it; a new one where there
+    is none. BadInput for one that is damaged."""
     key_bytes = 32
-    path = key_path(dataset)
+    path = dataset.with_name(f"{dataset.name}.key")
     if not path.exists():
         replace_bytes(path, f"{secrets.token_hex(key_bytes)}\n".encode("ascii"), 0o600)
     try:

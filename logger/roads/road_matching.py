@@ -360,7 +360,8 @@ def _best_chain(network: RoadNetwork, trace: Trace, receiver: Receiver, start: _
             chains = [chain._replace(candidate=NO_WAY, known=False) for chain in chains]
         ahead = [(number, chain._replace(error=_drifted(chain.error, step_s, receiver, spread)))
                  for number, chain in enumerate(chains)]
-        drift = _drift_m2(step_s, receiver)
+        # Variance that the difference of two errors gains in this time [m2].
+        drift = 2 * receiver.std_m**2 * (1 - exp(-2 * max(step_s, 0.0) / receiver.correlation_s))
         new = [found for one in here for found in _distinct(
             [_on(lists, chain, one, number, here, before, receiver) for number, chain in ahead])]
         new += [found for one in here for found in _distinct(
@@ -482,11 +483,6 @@ def _clear_of(lists: _Lists, one: int, error: _State, fast: float) -> float:
     aside_m = abs(lists.aside_m[one] - error_e * left_e - error_n * left_n)
     reach = sqrt(spread)
     return log(0.5 * (erfc((_STREETS_M - aside_m) / reach) + erfc((_STREETS_M + aside_m) / reach)) + least)
-
-
-def _drift_m2(step_s: float, receiver: Receiver) -> float:
-    """Variance that the difference of two errors gains in some time [m2]."""
-    return 2 * receiver.std_m**2 * (1 - exp(-2 * max(step_s, 0.0) / receiver.correlation_s))
 
 
 def _drifted(state: _State, step_s: float, receiver: Receiver, spread: float) -> _State:

@@ -292,8 +292,9 @@ class Odometer:
             self.rejected_fixes += 1
             return
         self._rejected = 0
-        if self._still_standing(speed_mps, plausible):
-            self._move_last(timed.t_us, fix.lat_deg, fix.lon_deg)
+        # The last two knots stand, and so does the new one: one knot is enough for hours of parking.
+        if (plausible and speed_mps == 0.0 and self._speed_mps[-2:] == [0.0, 0.0] and self._leg[-2] == self._leg[-1]):
+            self._t_us[-1], self._lat_deg[-1], self._lon_deg[-1] = timed.t_us, fix.lat_deg, fix.lon_deg
             return
         distance_m, leg = self._extend(timed.t_us, speed_mps, plausible)
         self._t_us.append(timed.t_us)
@@ -345,15 +346,6 @@ class Odometer:
         if keep:
             for knots in (self._t_us, self._speed_mps, self._distance_m, self._lat_deg, self._lon_deg, self._leg):
                 del knots[:keep]
-
-    def _still_standing(self, speed_mps: float, plausible: bool) -> bool:
-        """The last two knots stand, and so does the new one: one knot is enough for hours of parking."""
-        return plausible and speed_mps == 0.0 and self._speed_mps[-2:] == [0.0, 0.0] and self._leg[-2] == self._leg[-1]
-
-    def _move_last(self, t_us: int, lat_deg: float, lon_deg: float) -> None:
-        self._t_us[-1] = t_us
-        self._lat_deg[-1] = lat_deg
-        self._lon_deg[-1] = lon_deg
 
     def _extend(self, t_us: int, speed_mps: float, plausible: bool) -> tuple[float, int]:
         """Distance at the next knot, and its leg: a new one after a long loss and where the knots contradict."""

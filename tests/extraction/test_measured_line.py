@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from logger.extraction.along_track import MeasuredLine, goes_back, passes
+from logger.extraction.along_track import MeasuredLine, passes
 
 M_PER_DEG = 111_195.08
 
@@ -40,7 +40,7 @@ def test_the_other_direction_is_no_pass_and_is_recognised() -> None:
     driven = np.arange(0, 1000, 10.0)
     along, aside = 1500 - driven, np.full(100, 2.0)
     assert not passes(driven, along, aside)
-    assert goes_back(driven, along, aside)
+    assert passes(driven, -along, aside)
 
 
 def test_standing_beside_the_line_is_no_pass() -> None:

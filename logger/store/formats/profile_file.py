@@ -96,7 +96,9 @@ class ErdFile:
         Profile ...); two channels without names are left and right in this order. BadInput otherwise.
         """
         chosen = self._sides()
-        tracks = tuple(self.values[:, channel] * self._unit_m(channel) for channel in chosen)
+        tracks = tuple(self.values[:, channel] * _metres(
+            self.units[channel], f"{self.place}: expected elevations in", f" for channel {channel + 1} (UNITSNAM)")
+            for channel in chosen)
         if any(np.abs(track).max(initial=0.0) > ELEVATION.largest for track in tracks):
             raise BadInput(f"{self.place}: expected elevations within {ELEVATION.largest:g} m, found "
                            f"{max(np.abs(track).max() for track in tracks):.3g} (another byte order?)")
@@ -113,10 +115,6 @@ class ErdFile:
             return (0, 1)
         names = shown(", ".join(self.names))
         raise BadInput(f"{self.place}: expected one channel, or one named left and one named right, found {names}")
-
-    def _unit_m(self, channel: int) -> float:
-        return _metres(self.units[channel], f"{self.place}: expected elevations in", f" for channel {channel + 1} "
-                       "(UNITSNAM)")
 
 
 def _metres(unit: str, expected: str, where: str = "") -> float:
