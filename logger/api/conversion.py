@@ -14,7 +14,7 @@ import numpy as np
 from logger.api.log_questions import ConvertQuestion
 from logger.api.shown import CommandResult, check_out
 from logger.errors import BadInput
-from logger.exchange.layer import Attribute, Feature, Kind, Layer, cut, format_of, windows_layer, write_layer
+from logger.exchange.layer import Feature, Layer, attributes, cut, format_of, windows_layer, write_layer
 from logger.left_out import counting, left_out_json, left_out_lines
 from logger.printable import counted
 from logger.question import function
@@ -78,11 +78,8 @@ def _ways(files: Sequence[LoggedFile], roads: Path | str) -> Layer:
 
 _CELL_M = 25.0
 _TAGS = ("name", "highway", "surface")
-_FIELDS = (Attribute("osm_way", Kind.COUNT), *(Attribute(name, Kind.WORDS) for name in _TAGS),
-           Attribute("smoothness_tagged", Kind.WORDS), Attribute("smoothness_suggested", Kind.WORDS),
-           Attribute("confidence", Kind.NUMBER), Attribute("iri_m_per_km", Kind.NUMBER),
-           Attribute("iri_std_m_per_km", Kind.NUMBER),
-           Attribute("covered_m", Kind.NUMBER), Attribute("length_m", Kind.NUMBER), Attribute("drives", Kind.COUNT))
+_FIELDS = attributes("osm_way", *_TAGS, "smoothness_tagged", "smoothness_suggested", "confidence", "iri_m_per_km",
+                     "iri_std_m_per_km", "covered_m", "length_m", "drives")
 
 
 def smoothness_layer(records: Sequence[WindowRecord], ways: Sequence[MapWay]) -> Layer:

@@ -20,7 +20,7 @@ from logger.api.shown import CommandResult
 from logger.chart_data import Array, Chart, Curves, Line
 from logger.comfort.iso2631 import comfort_word
 from logger.errors import BadInput
-from logger.exchange.layer import Attribute, Feature, Kind, Layer, cut, half_way, iri_title, write_layer
+from logger.exchange.layer import Feature, Layer, attributes, cut, half_way, iri_title, write_layer
 from logger.left_out import left_out_json, left_out_paragraph
 from logger.printable import counted
 from logger.question import function
@@ -89,11 +89,11 @@ class RepeatedDrives(CommandResult):
 
     def layer(self) -> Layer:
         """Cells as lines, for the formats of ``convert``."""
-        return Layer("passes", _fields(_CELL), tuple(_cells(self._found)))
+        return Layer("passes", attributes(*_CELL), tuple(_cells(self._found)))
 
     def visits(self) -> Layer:
         """Places to visit as points, the most urgent first, for the formats of ``convert``; waypoints in GPX."""
-        return Layer("visits", _fields(_VISIT), tuple(_layer_visits(self._found)), points=True)
+        return Layer("visits", attributes(*_VISIT), tuple(_layer_visits(self._found)), points=True)
 
     def as_page(self, of: str) -> Html:
         """Map, curves and tables as one page."""
@@ -414,17 +414,11 @@ def _utc(time_s: float) -> str | None:
     return iso_utc(round(time_s * US_PER_S)) if isfinite(time_s) else None
 
 
-_KINDS = {"cell": Kind.COUNT, "drives": Kind.COUNT, "first_utc": Kind.TIME, "last_utc": Kind.TIME, "what": Kind.WORDS,
-          "comfort": Kind.WORDS, "changed": Kind.WORDS}
 _CELL = ("cell", "drives", "iri_m_per_km", "iri_std_m_per_km", "a_w_mps2", "lat_deg", "lon_deg", "heading_deg",
          "first_utc", "last_utc", "trend_m_per_km_year", "trend_std_m_per_km_year", "trend_p_value", "change_m_per_km",
          "change_std_m_per_km", "change_p_value", "change_false_share", "changed")
 _VISIT = ("what", "length_m", "confidence", "comfort", "drives", "iri_m_per_km", "iri_std_m_per_km", "a_w_mps2",
           "lat_deg", "lon_deg", "heading_deg", "first_utc", "last_utc")
-
-
-def _fields(names: tuple[str, ...]) -> tuple[Attribute, ...]:
-    return tuple(Attribute(name, _KINDS.get(name, Kind.NUMBER)) for name in names)
 
 
 def _cells(found: CombinedDrives) -> Iterator[Feature]:

@@ -342,11 +342,7 @@ def section_values(one: DriveSections) -> Iterator[dict[str, Any]]:
 _NUMBERS = ("distance_start_m", "distance_end_m", "known_m", "iri_m_per_km", "iri_std_m_per_km", "a_w_mps2",
             "speed_mps", "worst_m_per_km", "worst_at_m")
 _WORDS = ("condition", "comfort")
-FIELDS = (layer.Attribute("log", layer.Kind.WORDS), layer.Attribute("drive", layer.Kind.COUNT),
-          layer.Attribute("t_utc", layer.Kind.TIME),
-          layer.Attribute("direction", layer.Kind.WORDS),
-          *(layer.Attribute(name, layer.Kind.NUMBER) for name in _NUMBERS),
-          *(layer.Attribute(name, layer.Kind.WORDS) for name in _WORDS))
+FIELDS = layer.attributes("log", "drive", "t_utc", "direction", *_NUMBERS, *_WORDS)
 
 
 def _features(drive: DriveSections) -> Iterator[layer.Feature]:

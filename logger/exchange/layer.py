@@ -106,6 +106,18 @@ class Attribute:
     kind: Kind
 
 
+_WORDS = ("log", "direction", "condition", "comfort", "iri_class", "flags", "what", "changed", "visit", "name",
+          "highway", "surface", "smoothness_tagged", "smoothness_suggested")
+_COUNTS = ("segment", "drive", "drives", "samples", "clipped_samples", "cell", "cars", "key", "osm_way")
+
+
+def attributes(*names: str) -> tuple[Attribute, ...]:
+    """Columns by their names; a name that ends in ``_utc`` is that of a time, others are numbers unless listed here."""
+    kinds = dict.fromkeys(_WORDS, Kind.WORDS) | dict.fromkeys(_COUNTS, Kind.COUNT)
+    return tuple(Attribute(name, Kind.TIME if name.endswith("_utc") else kinds.get(name, Kind.NUMBER))
+                 for name in names)
+
+
 @dataclass(frozen=True)
 class Feature:
     """A row.
@@ -186,10 +198,7 @@ def _line(line: Line) -> bytes:
 
 
 LAYER = "windows"
-_KINDS = {"t_utc": Kind.TIME, "segment": Kind.COUNT, "drive": Kind.COUNT, "samples": Kind.COUNT,
-          "clipped_samples": Kind.COUNT, "comfort": Kind.WORDS, "iri_class": Kind.WORDS, "flags": Kind.WORDS}
-FIELDS = (Attribute("log", Kind.WORDS),
-          *(Attribute(column.name, _KINDS.get(column.name, Kind.NUMBER)) for column in COLUMNS))
+FIELDS = attributes("log", *(column.name for column in COLUMNS))
 
 
 def windows_layer(files: Sequence[LoggedFile]) -> Layer:

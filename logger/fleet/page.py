@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.errors import BadInput
-from logger.exchange.layer import Attribute, Feature, Geometry, Kind, Layer, cut, format_of, iri_title
+from logger.exchange.layer import Feature, Geometry, Layer, attributes, cut, format_of, iri_title
 from logger.files import make_folder, whole_folder, write_file, write_text
 from logger.fleet.dataset import Engine
 from logger.fleet.ingest import Counts
@@ -180,9 +180,7 @@ def _number(value: float, decimals: int) -> str:
 
 _NUMBERS = ("lat_deg", "lon_deg", "heading_deg", "length_m", "passes", "iri_m_per_km", "iri_std_m_per_km",
             "trend_m_per_km_per_year", "trend_std_m_per_km_per_year", "p_value", "a_w_mps2", "speed_mps")
-FIELDS = (Attribute("key", Kind.COUNT), Attribute("cars", Kind.COUNT),
-          *(Attribute(name, Kind.NUMBER) for name in _NUMBERS),
-          Attribute("condition", Kind.WORDS), Attribute("last_utc", Kind.TIME), Attribute("visit", Kind.WORDS))
+FIELDS = attributes("key", "cars", *_NUMBERS, "condition", "last_utc", "visit")
 _DRAWN_M = {"segment": SEGMENT_M, "section": SECTION_M}
 
 
