@@ -73,7 +73,7 @@ def checked_record(folder: Path) -> Target:
             name, columns = read_columns(path)
             found = record_checks.even_columns(columns, name, asked)
         else:
-            name, t_s, accel = read_record_columns(path)
+            name, t_s, accel, _ = read_record_columns(path)
             found = record_checks.even_record(t_s, accel, {}, name, asked)
         promise(0 < found.rate_hz < float("inf") and isfinite(found.start_s), "no rate")
         _finite(*found.accel_mps2.values(), *found.others.values())
