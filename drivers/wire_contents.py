@@ -287,23 +287,23 @@ def _shown(line: bytes) -> str:
     return shortened(line.decode("utf-8", "replace").strip(), 60)
 
 
-_EXCHANGED = ("{{expected}} expected, and what comes is {{what}}{{shown}}, as {other} sends: the two ports may be "
-              "exchanged. Compare gps.port and the accelerometer's port in the settings with ls -l /dev/serial/by-id")
-_LEVEL = ("{what} comes: the line stands at the wrong level. Check that TX, RX and ground are not exchanged, and that "
-          "no RS-232 plug is on a 3.3 V input")
+_EXCHANGED = ("{{expected}} expected, but what comes is {{what}}{{shown}}, as {other} sends: the two ports may be "
+              "swapped. Compare gps.port and the accelerometer's port in the settings with ls -l /dev/serial/by-id")
+_LEVEL = ("{what} comes: the line is at the wrong level. Check that TX, RX and ground are not swapped, and that no "
+          "RS-232 plug is on a 3.3 V input")
 _NOISE = ("bytes arrive, but none that can be read{shown}: check the baud rate in the settings, and that no other "
           "device is on this port")
 _DAMAGED = ("{what} sentences have a wrong checksum{shown}, so they are damaged on the way: check the ground wire, the "
             "length of the cable, and that no other device is on this port")
 
 ADVICE = {
-    (RECEIVER, "sentences"): "it sends {what}{shown}, and places are taken from RMC, GGA and GLL alone: have it send "
-                             "RMC, which says time, date, place and speed in one sentence",
-    (RECEIVER, "no_checksum"): "its sentences ({what}) come without a checksum{shown}, and are not taken, as a damaged "
-                               "one would not be noticed: switch the checksum on in the receiver",
+    (RECEIVER, "sentences"): "it sends {what}{shown}, but ridelog takes places only from RMC, GGA and GLL: have it "
+                             "send RMC, which has time, date, place and speed in one sentence",
+    (RECEIVER, "no_checksum"): "its sentences ({what}) come without a checksum{shown}, so ridelog ignores them, as "
+                               "damage would go unnoticed: switch the checksum on in the receiver",
     (RECEIVER, "damaged"): _DAMAGED,
-    (RECEIVER, "malformed"): "its {what} have the right checksum, but a field in them cannot be what its place "
-                             "says{shown}: renew its firmware, or have it send other sentences ({expected} expected)",
+    (RECEIVER, "malformed"): "its {what} have the right checksum, but a field in them has an impossible value{shown}: "
+                             "renew its firmware, or have it send other sentences ({expected} expected)",
     (RECEIVER, "receiver_binary"): "it sends {what}, and {expected} expected: switch it to NMEA at this port (RMC and "
                                    "GGA are enough)",
     (RECEIVER, "text"): "whole lines of text come, so the baud rate is right, but they are no NMEA sentences{shown}; "

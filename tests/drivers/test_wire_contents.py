@@ -188,13 +188,13 @@ def test_at_the_receivers_port_it_says_what_comes_and_what_to_do() -> None:
         return decoder.unread
 
     assert said(nmea("GSV", numMsg=1, msgNum=1, numSV=0)).startswith("it sends GSV (such as '$")
-    assert "places are taken from RMC, GGA and GLL alone: have it send RMC" in said(
+    assert "ridelog takes places only from RMC, GGA and GLL: have it send RMC" in said(
         nmea("GNS", posMode="AA", numSV=9, lat=45.0, NS="N", lon=7.0, EW="E"))
     assert "switch the checksum on" in said(without_checksum)
     assert "$GPRMC,090000.00,A" in said(without_checksum)
     assert "UBX frames" in said(ubx)
     assert "switch it to NMEA" in said(ubx)
-    assert "ports may be exchanged" in said(witmotion)
+    assert "ports may be swapped" in said(witmotion)
     assert "lines of three numbers" in said(lines("{x:.3f},{y:.3f},{z:.3f}\r\n"))
     assert "\\x1b[2J" in said(lambda: b"hello \xc2\xa0\r\n") or "hello" in said(lambda: b"hello world\r\n")
     assert all(words.isprintable() for words in map(said, (lambda: b"\x1b[2J\r\n", lambda: payload(30), damaged)))
@@ -223,7 +223,7 @@ def test_at_the_sensors_port_a_time_or_a_receiver_is_recognised() -> None:
     assert "4 numbers, the first of which grows as a time does, with commas between them" in decoder.unread
     other = PascoDecoder(load_profile("lines"))
     other.feed(0, b"".join(nmea("GSV", numMsg=1, msgNum=1, numSV=0)() for _ in range(40)))
-    assert "as a GPS receiver sends: the two ports may be exchanged" in other.unread
+    assert "as a GPS receiver sends: the two ports may be swapped" in other.unread
 
 
 @pytest.mark.parametrize(("line", "layout"), [

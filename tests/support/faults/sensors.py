@@ -308,7 +308,7 @@ def another_device(folder: Path, kind: str) -> Found:
     assert (wrong.state, wrong.readings) == ("doubtful", 0)
     assert (right.state, right.readings > 10) == ("ok", True)
     reported = " ".join(advice(status))
-    assert ("no other device" if kind == "wrong baud rate" else "ports may be exchanged") in reported
+    assert ("no other device" if kind == "wrong baud rate" else "ports may be swapped") in reported
     return found(reported=reported)
 
 

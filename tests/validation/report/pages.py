@@ -119,8 +119,8 @@ def opening(records: Sequence[Record], asked: int) -> list[str]:
     lines.append("All goals that are shares of cases are met." if not missed else
                  f"Goals missed: {'; '.join(f'{_uncapital(goal.name)} ({_share(goal.found)})' for goal in missed)}.")
     confused = sum(map(by_confusion, of_kind(records, "one")))
-    lines.append(f"Of the right answers to one effect, {confused} named another first and the right one as what the "
-                 "runs cannot tell from it.")
+    lines.append(f"Of the right answers to one effect, {confused} named another effect first and listed the right one "
+                 "as not distinguishable from it.")
     return lines
 
 
@@ -274,7 +274,8 @@ class Matrix:
 _MATRIX_LINES = (
     "Cases that hid one thing, or nothing, and whose distance is right: what was hidden (rows) and what was said "
     "first (columns). A case off the list counts as unexplained where that was said, whatever else was. *Confused*: "
-    "so many of the row named another first and the right one as not distinguishable from it, which counts as right.",)
+    "cases of the row in which another effect was named first and the right one listed as not distinguishable from "
+    "it; they count as right.",)
 
 
 def _row(record: Record) -> str:
