@@ -275,7 +275,8 @@ def parse_columns(data: bytes, file: str, choose: Callable[[Names], Names | None
     if wanted is None and table.line == 0:
         raise table.no_header(header)
     if wanted is None:
-        raise BadInput(f"{file}:{table.line}: expected {header}, found {shown(table.found)}{_taken_by(table.names)}")
+        raise BadInput(f"{file}:{table.line}: expected {header}, found {shown(table.found)}"
+                       f"{_taken_by(table.names, header)}")
     rows = read_rows(table, [table.names.index(name) for name in wanted], wanted, gaps)
     named = FileOfRows(file)
     named.lines = rows.lines
@@ -438,10 +439,10 @@ def shown(text: str) -> str:
     return shortened(text, SHOWN) if text else "nothing"
 
 
-def _taken_by(names: Names) -> str:
+def _taken_by(names: Names, header: str) -> str:
     """What a file is that another command takes; nothing for other files. A command refuses no file with all columns
-    that it wants, so that nobody is sent to the command that has just refused."""
-    known = "a profile: ridelog iri" if names == _PROFILE else next(
+    that it wants, so that nobody is sent to the command that has just refused, and no profile for the lack of places."""
+    known = "a profile: ridelog iri" * (names[0] not in header) if names == _PROFILE else next(
         (words for columns, words in _TAKEN_BY if columns <= set(names)), "")
     return f"; this is {known} takes it" if known else ""
 
