@@ -441,8 +441,8 @@ def shown(text: str) -> str:
 
 def _taken_by(names: Names, header: str) -> str:
     """What a file is that another command takes; nothing for other files. A command refuses no file with all columns
-    that it wants, so that nobody is sent to the command that has just refused, and no profile for the lack of places."""
-    known = "a profile: ridelog iri" * (names[0] not in header) if names == _PROFILE else next(
+    that it wants, so that nobody is sent to the command that has just refused, and no profile that lacks places."""
+    known = "a profile: ridelog iri" * ("distance_m,lat" not in header) if names == _PROFILE else next(
         (words for columns, words in _TAKEN_BY if columns <= set(names)), "")
     return f"; this is {known} takes it" if known else ""
 
