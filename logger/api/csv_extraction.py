@@ -452,8 +452,9 @@ def _fixes(tables: _Tables, asked: CsvSettings, config: Config, origin_s: float,
         return Fixes(time_s, np.full(len(time_s), asked.speed_mps), nowhere, nowhere)
     table = tables.location
     if table is None:
-        raise BadInput(f"{path}: expected a speed, or latitude and longitude, found neither: give the file that has "
-                       "them as --location FILE, name their columns in --columns, or give --speed M/S if it was steady")
+        raise BadInput(f"{path}: expected a speed, or latitude and longitude, found neither: ridelog extract --csv "
+                       "takes them from a file (--location FILE), named columns (--columns), or a steady speed "
+                       "(--speed M/S)")
     found = fixes_of(table, origin_s, tables.acceleration, config.pipeline.stationary_mps)
     span_s = (even.time_s[0], even.time_s[-1])
     inside = (found.time_s >= span_s[0] - 1.0) & (found.time_s <= span_s[1] + 1.0)

@@ -198,7 +198,7 @@ def _columns(text: str) -> list[str]:
 def _check_method(method: str) -> None:
     if method in MODAL_METHODS_GONE:
         beside = " with `input_column`" if "x" in method else ""
-        raise ValueError("no longer offered, it missed or made up modes: expected `method` "
+        raise ValueError("no longer offered, because it missed or invented modes: expected `method` "
                          f"{MODAL_METHODS_GONE[method]}{beside}")
 
 
@@ -238,9 +238,9 @@ class ModesQuestion(Question):
     record: Annotated[Union["ChannelRecord", Path, str], Argument(
         "CSV with t_s and one column per sensor", metavar="FILE", read=Path)]
     method: Annotated[str | None, Option(
-        f"{', '.join(MODAL_METHODS)}: era for a free decay, ssi for a random response, n4sid beside a measured input "
-        "(default: as the record is); decrement is Eq 5.2 of Blum 2015, for one mode of a free decay; none with a "
-        "vehicle", metavar="NAME", choices=MODAL_METHODS, check=_check_method)] = None
+        f"{', '.join(MODAL_METHODS)}: era for a free decay, ssi for a random response, n4sid with a measured input "
+        "(default: chosen from the record); decrement is Eq 5.2 of Blum 2015, for one mode of a free decay; none with "
+        "a vehicle", metavar="NAME", choices=MODAL_METHODS, check=_check_method)] = None
     _: KW_ONLY
     columns: Annotated[Sequence[str] | None, Option(
         "columns of the sensors (default: all but t_s, the input, and a drive's speed, distance and place)",
@@ -559,8 +559,8 @@ class LearnCarQuestion(LongQuestion):
     mass_kg: Annotated[float | None, Option(
         "of the whole car as it is driven [kg] (default: a convention)", _CAR_MASS, "KG")] = None
     sensor: Annotated[float | None, Option(
-        "ahead_m=M: the sensor sits so far ahead (+) of the car's middle; within 0.2 m will do (default: near its "
-        "centre of gravity)", metavar="ahead_m=M", read=_ahead)] = None
+        "ahead_m=M: how far the sensor sits ahead (+) of the car's middle, to 0.2 m (default: near its centre of "
+        "gravity)", metavar="ahead_m=M", read=_ahead)] = None
     compare: Annotated[Path | None, Option(
         "a vehicle file that was learnt before: say what has changed since", metavar="FILE.yaml", read=Path)] = None
 

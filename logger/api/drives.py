@@ -257,8 +257,8 @@ class Estimate(CommandResult):
 
     def remarks(self, written: Mapping[str, Sequence[Path]]) -> Sequence[str]:
         """The doubts, and that there is no profile, where one was to be written."""
-        none = [f"No profile in {path}: the readings resolve no wavelengths over a stretch longer than the longest of "
-                "them" for path in written.get("--profile-out", ()) if not self.profile]
+        none = [f"No profile in {path}: no stretch is longer than the longest wavelength that the readings "
+                "resolve" for path in written.get("--profile-out", ()) if not self.profile]
         return [*self.doubts, *none]
 
     def write(self, path: Path, option: str = "--out") -> None:

@@ -193,7 +193,7 @@ def _car_of(log: Path) -> str:
     if not isinstance(name, str) or not name:
         raise BadInput(f"{log}: expected the car's name in the description beside it, or --car NAME")
     if name == GENERIC:
-        raise BadInput(f"{log}: expected to know which car it is, found {GENERIC}, which any may be: --car NAME")
+        raise BadInput(f"{log}: expected the car's name, found {GENERIC}, which any car may be: --car NAME")
     return name
 
 

@@ -512,7 +512,7 @@ def _not_identifiable(problem: UnknownCar, car: LearnedCar) -> Iterator[str]:
     low, high = np.quantile(problem.spectra.speed_mps, (0.05, 0.95))
     if high < _ONE_SPEED * low:
         yield (f"All drives at one speed ({3.6 * low:.0f} to {3.6 * high:.0f} km/h): springs and the road's waviness "
-               "cannot be told apart; add one at 30 and one at 90 km/h.")
+               "cannot be separated; add one at 30 and one at 90 km/h.")
     elif 3.6 * high < 60:
         yield "No drive was faster than 60 km/h: add one at 90 km/h, where springs and dampers show best."
     prior = problem.knowledge.std

@@ -206,7 +206,8 @@ class IngestQuestion(LogsQuestion):
         "it)", metavar="NAME")] = None
     car_folders: Annotated[bool, Option("each car has its own folder of logs, named after the car")] = False
     roads: Annotated[Path | str | None, Option(
-        "roads to lay the windows on, at the first ingest (default: cells of the ground of 66 ft)",
+        "map of the roads to which windows are assigned, at the first ingest (default: squares of 66 ft on the "
+        "ground)",
         metavar="FILE.geojson", read=Path)] = None
     trim_m: Annotated[float | None, Option(
         "leave out this length at each drive's start and end [m]; the first ingest sets it (default: 0)",

@@ -215,8 +215,7 @@ def _asked(given: record_checks.ChannelRecord | Path | str, question: ModesQuest
     if not outputs:
         raise BadInput(f"{at}: expected a column other than the input {pushed}")
     if not (samples.std(axis=0) > 0).all():
-        raise question.complaint(f"{name}: expected every column to move between `from_s` and "
-                       f"`to_s`")
+        raise question.complaint(f"{name}: expected every column to vary between `from_s` and `to_s`")
     inputs = None if pushed is None else samples[:, [record.names.index(pushed)]]
     names = tuple(record.names[place] for place in outputs)
     return replace(record, names=names, start_s=float(t_s[inside][0]), samples=samples[:, outputs]), inputs
@@ -271,7 +270,7 @@ def modes_of_drive(given: ChannelRecord | Path | str, question: ModesQuestion) -
         raise question.complaint(f"{name}: expected `from_s` before `to_s`, within "
                        f"{time_s[0]:g} to {time_s[-1]:g} s")
     if not np.ptp(samples[inside]) > 0:
-        raise BadInput(f"{name}: expected an acceleration that moves, found {samples[inside][0]:g} m/s2 all along")
+        raise BadInput(f"{name}: expected an acceleration that varies, found {samples[inside][0]:g} m/s2 throughout")
     try:
         found = car_modes(model.vehicle, samples[inside], speed_mps[inside], usable[inside], rate_hz)
     except ValueError as error:

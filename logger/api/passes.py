@@ -274,8 +274,8 @@ def _summary(found: CombinedDrives) -> Iterator[str]:
             yield (f"All drives over a place share {found.scatter.alike:.0%} of the variance of their windows' errors; "
                    "more drives do not reduce that part")
     else:
-        yield ("No two drives passed the same piece, so the standard errors lack how whole drives differ (tires, load, "
-               "temperature)")
+        yield ("No two drives passed the same piece, so the standard errors do not include how whole drives differ "
+               "(tires, load, temperature)")
 
 
 def _passes_visits(found: CombinedDrives) -> Iterator[str]:
@@ -323,7 +323,8 @@ def change_lines(found: CombinedDrives) -> list[str]:
 
 def _passes_changes(found: CombinedDrives, change: Changes) -> Iterator[str]:
     if not len(change.key):
-        yield "No change can be measured: no piece of road was passed in both periods."
+        yield ("No change can be measured: no piece of road was passed in both periods (rows without a date are in "
+               "neither).")
         return
     words = [changed(change, one) for one in range(len(change.key))]
     worse, better = words.count("worse"), words.count("better")

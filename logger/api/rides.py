@@ -271,10 +271,10 @@ def lines(result: RideComfort, name: str) -> list[str]:
                                                   for value in values))
     exponential = ", ".join(f"{result.axes[axis].mtvv_exponential_mps2:.3f}" for axis in sorted(result.axes))
     printed += [f"MTVV with exponential averaging: {exponential} m/s2", "", *conclusions, "",
-              f"Method: {METHOD}; the mean is taken off."]
+              f"Method: {METHOD}; the mean is removed."]
     if result.unseen_from_hz is not None:
         printed.append(f"The record cannot show what lies above {result.unseen_from_hz:.4g} Hz. The standard counts it "
-                     f"up to {result.weighting.counts_up_to_hz:g} Hz: the values are of what was recorded.")
+                     f"up to {result.weighting.counts_up_to_hz:g} Hz; the values cover only what was recorded.")
     if result.left_out:
         printed.append("Other axes are combined only with Wk, x and y together; left out.")
     return printed
@@ -286,7 +286,7 @@ def _conclusions(result: RideComfort) -> list[str]:
     if result.weighting.is_sickness:
         lines.append(f"Motion sickness dose: {_sickness_dose(result.vertical):.3f} m/s1.5.")
     elif not result.weighting.comfort_words:
-        lines.append(f"Comfort: no words: ISO 2631-1 has none for {result.weighting.name.capitalize()}.")
+        lines.append(f"Comfort: ISO 2631-1 has no words for {result.weighting.name.capitalize()}.")
     elif len(result.axes) > 1:
         totals = _totals(result)
         lines.append(f"Feels {_spoken(totals['total_comfort'])}: a_w {totals['total_a_w_mps2']:.3f} m/s2 over three "
@@ -298,7 +298,7 @@ def _conclusions(result: RideComfort) -> list[str]:
         lines.append(_which_to_use(result))
     health = _health(result)
     if health is None:
-        return [*lines, f"Health: {result.weighting.name.capitalize()} is not a weighting of health."]
+        return [*lines, f"Health: {result.weighting.name.capitalize()} is not a weighting for health."]
     n2, n4, dose = (health["caution_zone"][name] for name in ("n2", "n4", "vdv"))
     return [
         *lines,

@@ -37,7 +37,7 @@ from logger.store.formats.logger_csv import named_columns
 from logger.store.formats.vehicle_file import CarModel, read_model
 from logger.studies.study import Cell, Column, Result, Table, Workload
 
-NOT_RUN = "Only a person can download the real files; ridelog's developers have not run them and claim nothing of them."
+NOT_RUN = "Only a person can download the real files; ridelog's developers have not run them and make no claims."
 
 
 def from_folder(called: str, download: str, read: Callable[[Path, Workload], Result]) -> Callable[[Workload], Result]:

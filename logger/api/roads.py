@@ -257,7 +257,7 @@ def _roughest(result: ProfileIri) -> float:
 
 def _cut_short(result: ProfileIri) -> list[str]:
     """What is to be said of a profile that no window fits into."""
-    return ["The profile is shorter than one window (--window): its IRI is of all there is.", ""] if (
+    return ["The profile is shorter than one window (--window): its IRI is that of the whole profile.", ""] if (
         all(window.partial for window in result.windows)) else []
 
 
@@ -323,7 +323,7 @@ def class_lines(tracks: Sequence[TrackClass], profile: Profile, name: str) -> li
 def _track_lines(track: TrackClass) -> list[str]:
     found = track.roughness
     doubt = "" if len(found.classes) == 1 else \
-        f"; the road is too short or too odd to be sure: it may be {' or '.join(found.classes)}"
+        f"; the road is too short or too irregular to be sure: it may be {' or '.join(found.classes)}"
     return [
         f"class      {found.road_class}: {IRI_CLASSES[found.road_class]}{doubt}",
         f"Gd(n0)     {measured(found.gd_n0_cm3, found.gd_n0_std_cm3)} cm3, from waves of "

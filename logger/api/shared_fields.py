@@ -33,7 +33,7 @@ VehicleName = Annotated[Vehicle, Option(
     metavar="NAME|FILE", read=str)]
 Anyway = Annotated[bool, Option("go on although a run seems to be of another road or car, or in other units")]
 TrackedRuns = Annotated[Runs, Argument(
-    "folder with drive.csv and profile.csv, or of a rig excitation.csv", metavar="RUN", read=Path, many=list)]
+    "folder with drive.csv and profile.csv (of a rig: excitation.csv)", metavar="RUN", read=Path, many=list)]
 Tolerance = Annotated[float | str | None, Option(
     "how well the vehicle's masses, springs and dampers are known where its file does not say: one standard "
     f"deviation, as a share (default: {USUAL_TOLERANCE:g}; of lengths 0.02). {UNKNOWN}: nothing is known of any",

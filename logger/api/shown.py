@@ -91,7 +91,7 @@ def check_outs(asked: Iterable[tuple[str, Path | None]], runs: Iterable[Path] = 
     for option, out in asked:
         if out is not None:
             if out.resolve() in taken:
-                raise BadInput(f"{option} {out}: expected every file to be another one")
+                raise BadInput(f"{option} {out}: expected a different file each time")
             check_out(out, folders, files, option)
             taken.add(out.resolve())
 
@@ -108,7 +108,7 @@ def check_out(out: Path, runs: Iterable[Path], read: Iterable[Path] = (), option
     if out.resolve() in {(folder / name).resolve() for folder in runs for name in (DRIVE, PROFILE, EXCITATION, RUN)}:
         raise BadInput(f"{said}: expected a file that does not belong to a run")
     if out.resolve() in {path.resolve() for path in read}:
-        raise BadInput(f"{said}: expected another file than those that are read")
+        raise BadInput(f"{said}: expected a file other than the input")
     if not out.parent.is_dir() or out.is_dir():
         raise BadInput(f"{said}: expected a file in a folder that exists")
     if why := why_not_written(out):

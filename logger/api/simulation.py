@@ -180,7 +180,7 @@ def _knots(time_s: npt.ArrayLike, speed_mps: npt.ArrayLike, name: str) -> tuple[
     times, speeds = (np.asarray(one, dtype=np.float64) for one in (time_s, speed_mps))
     grows, possible = (np.diff(times) > 0).all(), ((speeds >= 0) & (speeds <= 100)).all()
     if not 1 < len(times) == len(speeds) or not (grows and possible):
-        raise BadInput(f"{name}: expected two times or more that grow, and as many speeds of 0 to 100 m/s")
+        raise BadInput(f"{name}: expected two or more increasing times, and as many speeds of 0 to 100 m/s")
     return times, speeds
 
 

@@ -61,7 +61,7 @@ class Model(vehicle_file.CarModel, Shown):
         60.0
         """
         if unknown := set(values) - set(self.numbers):
-            raise BadInput(f"{self.vehicle.name}: no number {sorted(unknown)[0]!r}: expected one of "
+            raise BadInput(f"{self.vehicle.name}: no parameter {sorted(unknown)[0]!r}: expected one of "
                            f"{', '.join(self.numbers)}")
         return replace(self, vehicle=changed(self.vehicle, values))
 

@@ -112,10 +112,10 @@ def test_what_cannot_be_written_is_refused_first(command: str, runs: list[str], 
 def test_a_page_or_a_story_is_not_written_over_the_vehicle(runs: list[str], tmp_path: Path) -> None:
     car = Path(car_with(tmp_path, ""))
     for command in ("compare", "diagnose"):
-        with pytest.raises(BadInput, match="expected another file than those that are read"):
+        with pytest.raises(BadInput, match="expected a file other than the input"):
             main([command, "--vehicle", str(car), *runs, "--out", str(car)])
     car = car.rename(tmp_path / "vehicle-1.yaml")
-    with pytest.raises(BadInput, match=r"vehicle-1\.yaml: expected another file than those that are read"):
+    with pytest.raises(BadInput, match=r"vehicle-1\.yaml: expected a file other than the input"):
         main(["lab", "--yes", "--vehicle", str(car), *runs, "--out", str(tmp_path)])
 
 

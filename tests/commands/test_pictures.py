@@ -79,13 +79,13 @@ def test_the_same_result_is_the_same_file(folder: Path, monkeypatch: pytest.Monk
 
 
 @pytest.mark.parametrize(("words", "complaint"), [
-    (["iri", "road.csv", "--out", "road.csv"], "--out road.csv: expected another file than those that are read"),
+    (["iri", "road.csv", "--out", "road.csv"], "--out road.csv: expected a file other than the input"),
     (["iri", "road.csv", "--out", "x.csv"], "--out x.csv: expected a file that ends in one of .html, .png, .svg"),
     (["iri", "road.csv", "--out", "nowhere/x.png"], "expected a file in a folder that exists"),
     (["modes", "decay.csv", "--method", "decrement", "--out", "x.png"],
      "--out x.png: expected a result with pictures, found one without; .html holds its words"),
     (["estimate", "drive.csv", "--vehicle", "rav4-2009", "--out", "drive.csv.png", "--profile-out", "drive.csv.png"],
-     "--profile-out drive.csv.png: expected every file to be another one"),
+     "--profile-out drive.csv.png: expected a different file each time"),
 ])
 def test_what_cannot_be_a_picture_is_one_line(words: list[str], complaint: str, folder: Path,
                                               monkeypatch: pytest.MonkeyPatch) -> None:

@@ -203,10 +203,10 @@ def test_files_that_will_not_do(folder: Path) -> None:
         assert refusal(folder, "--speed", str(speeds)).startswith(f"{speeds}:{line}: expected t_s within 100000 s")
     speeds.write_text("t_s,speed_mps\n0,1\n0.001,1\n")
     assert refusal(folder, "--speed", str(speeds)).startswith("expected a drive of 0.01 to 5000 s, found 0.001 s")
-    assert "expected another file than those that are read" in refusal(
+    assert "expected a file other than the input" in refusal(
         folder, "--speed", "20", "--out", str(folder / "profile.csv"))
     (folder / "mine.yaml").write_bytes(vehicle_file("rav4-2009").read_bytes())
-    assert "expected another file than those that are read" in refusal(
+    assert "expected a file other than the input" in refusal(
         folder, "--speed", "20", "--out", str(folder / "mine.yaml"), vehicle=str(folder / "mine.yaml"))
     (folder / "profile.csv").write_text("distance_m,elevation_m\n0,0\n1,x\n")
     assert "profile.csv:3: expected a number" in refusal(folder, "--speed", "20")

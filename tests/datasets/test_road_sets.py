@@ -110,7 +110,7 @@ def test_profilers_repeat_as_well_as_they_were_made_to(tmp_path: Path, capsys: p
     for name, off in (("85e7 against 1ccf", np.hypot(0.1, 0.1)), ("e9ef against 1ccf", np.hypot(0.1, 0.2))):
         expected = 1 - off**2 / np.var(np.log(iri))
         assert named[name, "nearest cells"]["R2 of log IRI"] == pytest.approx(expected, abs=0.05)
-        assert named[name, "laid over, each 200 m moved by up to 4 m"]["R2"] > named[name, "laid over"]["R2"] - 0.01
+        assert named[name, "aligned, each 200 m moved by up to 4 m"]["R2"] > named[name, "aligned"]["R2"] - 0.01
     assert all(row[3] > other[3] for row, other in zip(hundred["rows"], ten["rows"], strict=True))
 
 

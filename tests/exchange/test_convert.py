@@ -197,7 +197,7 @@ def test_what_it_says(logs: Path, capsys: pytest.CaptureFixture[str]) -> None:
     ("way.shp", rf"way.shp: expected a file that ends in one of {', '.join(f'.{name}' for name in sorted(formats()))}"),
     ("way", "way: expected a file that ends in one of"),
     ("nowhere/way.csv", "expected a file in a folder that exists"),
-    ("logs/00001-001.csv", "expected another file than those that are read"),
+    ("logs/00001-001.csv", "expected a file other than the input"),
 ])
 def test_what_cannot_be_written_is_one_line(logs: Path, to: str, complaint: str) -> None:
     before = (logs / "00001-001.csv").read_bytes()

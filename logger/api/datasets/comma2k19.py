@@ -32,14 +32,14 @@ def run(folder: Path, effort: Workload) -> Result:
     rows = tuple(row for one in drives for row in _rows(one))
     known = np.array([row[6] for row in rows if row[6] is not None], dtype=np.float64)
     if not len(known):
-        raise BadInput(f"{log}: expected a drive of 100 m or more at a steady speed, found no window that can be known")
+        raise BadInput(f"{log}: expected a drive of 100 m or more at a steady speed, found no window with an IRI")
     tables = [Table(f"Rows of {_WINDOW_M:g} m", (
         Column("from [m]", ".0f"), Column("to [m]", ".0f"), Column("latitude [deg]", ".6f"),
         Column("longitude [deg]", ".6f"), Column("speed [m/s]", ".1f"), Column("class"), Column("IRI [m/km]", ".2f"),
         Column("std. error [m/km]", ".2f")), rows)]
     words = (f"{len(known)} of {len(rows)} rows of {_WINDOW_M:g} m have an IRI, {known.mean():.2f} m/km on average, "
-             f"{known.min():.2f} to {known.max():.2f}. Nobody measured this road with a profiler here, so that is not "
-             "shown to be right.")
+             f"{known.min():.2f} to {known.max():.2f}. No profiler measured this road, so nothing shows whether that "
+             "is right.")
     speed = _speeds(log, recording)
     if speed is not None:
         tables.append(Table("The receiver's speed against the car's", (
@@ -116,12 +116,12 @@ def _map(drives: list[DrivenWindows]) -> Curves:
 _DOWNLOAD = "clone github.com/commaai/comma2k19 (MIT), which holds a segment in Example_1, or download the whole set"
 STUDY = Study(
     "comma2k19", "A minute of highway in a RAV4: from raw files to rows and a map", "Example_1",
-    "The segment goes the way of any recording: extract --csv with the receiver's places and speed, then estimate with "
-    "the noise learnt. The device sat on the windscreen, where it feels pitch as well; the model's sensor sits in the "
-    "middle, unless --vehicle names another car. This was run on the real minute.",
-    from_folder("comma2k19", _DOWNLOAD, run), (Item("comma2k19", Word.NOT_REPRODUCIBLE, "Of this minute no IRI is "
-                                                                                        "printed; the receiver's "
-                                                                                        "speed is later and faster "
+    "The segment is processed as any recording: extract --csv with the receiver's places and speed, then estimate "
+    "with the noise learnt. The device sat on the windscreen, where it feels pitch as well; the model's sensor sits "
+    "in the middle, unless --vehicle names another car. This was run on the real minute.",
+    from_folder("comma2k19", _DOWNLOAD, run), (Item("comma2k19", Word.NOT_REPRODUCIBLE, "No IRI of this minute was "
+                                                                                        "published; the receiver's "
+                                                                                        "speed is later and higher "
                                                                                         "than the car's, by the "
                                                                                         "figures above."),),
     source="Schafer et al., arXiv:1812.05752, 2018", data=f"comma2k19 ({_DOWNLOAD})")

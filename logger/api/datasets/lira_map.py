@@ -30,7 +30,7 @@ _QUANTITIES = (DISTANCE, SIGNAL, LATITUDE, LONGITUDE)
 _CELL_M, _MOST_CELLS = 10.0, 1
 _STRETCH_CELLS, _STRETCH_MOST_M = 20, 4.0
 _MOST_BYTES = 64 << 20
-_PIECEWISE = "laid over, each 200 m moved by up to 4 m"
+_PIECEWISE = "aligned, each 200 m moved by up to 4 m"
 
 
 class ProfilerPass:
@@ -73,13 +73,13 @@ def run(folder: Path, effort: Workload) -> Result:
         (one.name, float(np.ptp(one.edges_m)) / 1000, float(one.iri_m_per_km.mean())) for one in passes))
     spans = [f"{min(one):.3f} to {max(one):.3f}" for one in ours]
     verdict = (f"A reference profiler repeats itself with R2 {spans[0]} per 10 m and {spans[1]} per 100 m, the lower "
-               f"ones where its cells lie up to 5 m apart; two passes differ by up to {off_m_per_km[0]:.2f} and "
-               f"{off_m_per_km[1]:.2f} m/km (r.m.s.). No car can be shown to be better than that against one pass: it "
-               "is the ceiling of every comparison on real roads. The figures of 0.85 per 10 m and 0.955 per 100 m "
-               "that are quoted of these files are another thing: the squared correlation, which a pass that reads 4 "
-               "% more does not spoil, and after each stretch of road has been moved along by up to 4 m to where it "
-               f"fits best. So computed it is {squared[0]:.3f} and {squared[1]:.3f} here on average over the three "
-               "pairs; moving so many pieces fits some of the noise as well.")
+               f"values for cells up to 5 m apart; two passes differ by up to {off_m_per_km[0]:.2f} and "
+               f"{off_m_per_km[1]:.2f} m/km (r.m.s.). No car can be shown to be more accurate than that against one "
+               "pass: it is the ceiling of every comparison on real roads. The figures of 0.85 per 10 m and 0.955 per "
+               "100 m that are quoted for these files are a different quantity: the squared correlation, which a pass "
+               "that reads 4 % more does not lower, after each stretch of road was moved by up to 4 m to where it "
+               f"fits best. Computed like that, it is {squared[0]:.3f} and {squared[1]:.3f} here on average over the "
+               "three pairs; moving so many pieces also fits some of the noise.")
     return Result((*tables, length), verdict, (Picture(_picture(passes)),))
 
 
@@ -101,7 +101,7 @@ def _beside(one: ProfilerPass, other: ProfilerPass, window_m: float) -> list[tup
     piecewise, along_m = _moved_piecewise(one, edges_m, values)
     fitted = mean_between(one.edges_m, piecewise, *ends_m)
     return [repeat_row(names, "nearest cells", *nearest, moved_m=_CELL_M * cells),
-            repeat_row(names, "laid over", moved, whole, moved_m=shift_m),
+            repeat_row(names, "aligned", moved, whole, moved_m=shift_m),
             repeat_row(names, _PIECEWISE, fitted, np.where(np.isfinite(fitted), whole, np.nan), moved_m=along_m)]
 
 
@@ -131,10 +131,9 @@ _DOWNLOAD = "clone github.com/peacefulotter/LiRA-Map (MIT); server/backup is rea
 STUDY = Study(
     "lira_map", "How well a reference profiler repeats itself, 10 m and 100 m", "server/backup/trip_iri_*",
     "Three passes over some 26 km of Danish road, by their places. Their cells of 10 m begin at different places. "
-    "Nearest: each against the nearest of the other, up to 5 m off, which makes them less alike than they are. Laid "
-    "over: means of two cells' parts, smoother than what was measured, which makes them more alike. The truth lies "
-    "between. Moved piece by piece they are more alike still, for each piece may follow the noise. This was run on the "
-    "real files.",
+    "Nearest: each cell against the nearest one, up to 5 m off, which understates how alike they are. Aligned: means "
+    "of parts of two cells, smoother than the measured ones, which overstates it. The truth lies between. Moved piece "
+    "by piece they are even more alike, as each piece may follow the noise. This was run on the real files.",
     from_folder("LiRA-Map", _DOWNLOAD, run), (Item("LiRA-Map", Word.NOT_REPRODUCIBLE,
     "Run on the real files, it gives the ceiling that is printed with every other set; no paper prints it."),),
     source="peacefulotter/LiRA-Map, 2021", data=f"LiRA-Map ({_DOWNLOAD})")

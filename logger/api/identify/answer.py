@@ -535,8 +535,8 @@ def _far_from_file(fit: Fit) -> Iterator[str]:
     precision, pull = fit.prior
     for name, off in zip(fit.parameters, np.abs(pull) / np.sqrt(np.maximum(precision, 1e-300)), strict=True):
         if off > UNUSUAL_SIGMA:
-            yield (f"{name} came out {off:.1f} standard deviations from what the vehicle's file knows of it: either "
-                   "the file is wrong there, or the model lacks something that biases it.")
+            yield (f"{name} came out {off:.1f} standard deviations from its prior in the vehicle's file: either the "
+                   "file is wrong there, or the model lacks something that biases it.")
 
 
 def _p_value(test: Test) -> float | None:
@@ -611,7 +611,7 @@ def _ends(fit: Fit) -> str:
     scale = np.array([fit.standard_errors[one.name] for one in fit.free])
     best = fit.ends[np.argmin(np.abs((fit.ends - np.array(list(fit.parameters.values()))) / scale).max(axis=1))]
     same = int((np.abs((fit.ends - best) / scale).max(axis=1) < 1.0).sum())
-    return f"{same} of {len(fit.ends)} starts end at the same place; these are the best values."
+    return f"{same} of {len(fit.ends)} starts end at the same values; these are the best ones."
 
 
 def _table(fit: Fit | RoadFit, free: Sequence[Free]) -> Iterator[str]:
@@ -757,5 +757,5 @@ def _left(white: list[Array]) -> Curves:
     bound = np.full(len(lags), NORMAL_95 / np.sqrt(count))
     return Curves("Autocorrelation of the residuals", "lag [samples]", "correlation", (
         Line("residuals", lags.astype(np.float64), found),
-        Line("95 % of chance", lags.astype(np.float64), bound, faint=True),
+        Line("95 % of white noise", lags.astype(np.float64), bound, faint=True),
         Line("", lags.astype(np.float64), -bound, faint=True)), (0.0, ""))

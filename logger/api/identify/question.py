@@ -88,12 +88,12 @@ class IdentifyQuestion(question.LongQuestion):
 
     vehicle: shared_fields.VehicleName
     runs: Annotated[shared_fields.Runs, question.Argument(
-        "folder with drive.csv and profile.csv, or of a rig excitation.csv, or a drive.csv; of one sample rate",
+        "folder with drive.csv and profile.csv (of a rig: excitation.csv), or a drive.csv; all of one sample rate",
         metavar="RUN", read=Path, many=list)]
     free: Annotated[Sequence[str] | None, question.Option(
         "what to find: names as in the vehicle's file, dry_friction.friction_force_n of an effect, bump.height_m, "
-        "step.start_m, speed_scale or road.waviness of the road (default: what the vehicle's file calls unknown or not "
-        "known exactly, weighed with what it says, and its effects)", metavar="PARAM,...",
+        "step.start_m, speed_scale or road.waviness of the road (default: what the vehicle's file gives as unknown or "
+        "with a tolerance, which is its prior, and its effects)", metavar="PARAM,...",
         read=shared_fields.names_of)] = None
     _: KW_ONLY
     start: Annotated[Mapping[str, float] | None, question.Option(
@@ -112,9 +112,9 @@ class IdentifyQuestion(question.LongQuestion):
         "model of the residual: white (output error), ar (innovations form), road (roughness that the profile does "
         "not contain, through the car); auto: the likeliest", choices=question.NOISE_MODELS)] = "auto"
     low_pass_hz: shared_fields.LowPass = None
-    tries: Annotated[int, question.InPython("number of further starting points, spread around", question.TRIES)] = 0
+    tries: Annotated[int, question.InPython("number of additional starting points", question.TRIES)] = 0
     road: Annotated[str, question.Switches(
-        "measured: with its profile; unmeasured: each run has a road of its own, of the waviness; same: all are over "
+        "measured: with its profile; unmeasured: each run over a road of its own, of this waviness; same: all over "
         "one", choices=(MEASURED, UNMEASURED, SAME), by_value={
             UNMEASURED: ("unmeasured-road", "the roads were not measured; each run has one of its own"),
             SAME: ("same-road", "the road was not measured; all runs are over the same one; their places may be off "

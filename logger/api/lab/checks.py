@@ -198,7 +198,7 @@ def _other_ways_up(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
     for k, ((run, _), around) in enumerate(zip(followed.pairs, followed.around, strict=True)):
         if around.is_upside_down and (below := followed.below_at_hand[k]).turned > below.correlation:
             yield (f"{run.name}: expected {run.facts.main.name} up positive, found them upside down: turned over, they "
-                   f"go with the model (correlation {around.turned:.2f})")
+                   f"follow the model (correlation {around.turned:.2f})")
 
 
 def _other_units(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
@@ -407,8 +407,8 @@ def check_distances(drive: Drive, file: Path) -> None:
                            f"{distance_m[:at + 1].max():.6g} m")
     way_m, by_speed_m = float(distance_m[-1] - distance_m[0]), float(drive.speed_mps.sum() / drive.rate_hz)
     if abs(way_m - by_speed_m) > _DISAGREE * max(way_m, by_speed_m) + _DISAGREE_M:
-        raise BadInput(f"{file}: expected speed_mps [m/s] and distance_m [m] to agree, found {by_speed_m:.4g} m of way "
-                       f"by the one and {way_m:.4g} m by the other ({likely_unit(by_speed_m, way_m)})")
+        raise BadInput(f"{file}: expected speed_mps [m/s] and distance_m [m] to agree, found {by_speed_m:.4g} m from "
+                       f"the speed and {way_m:.4g} m from the distance ({likely_unit(by_speed_m, way_m)})")
 
 
 def driven_stretches(drive: DriveOnRoad) -> list[Run]:
@@ -480,13 +480,13 @@ def check_channels(drive: Drive, file: Path, vehicle: Vehicle) -> None:
     for signal, samples in read if drive.usable is None else []:
         if (share := share_at_ends(samples)) > _CLIPPED_SHARE:
             raise BadInput(f"{file}: {signal.name}: expected readings, found {share:.0%} of them at the largest and "
-                           "the smallest one exactly, as of an amplifier at its end: set its range wider, or add a "
+                           "the smallest one exactly, as from a saturated amplifier: set its range wider, or add a "
                            "column usable, 2 there and 1 elsewhere (1 everywhere if this is right)")
         if signal.measures == "force" and (still := longest_still(samples, drive.rate_hz)):
             from_s, to_s = (float(drive.time_s[min(one, len(samples) - 1)]) for one in still)
             raise BadInput(f"{file}: {signal.name}: expected readings, found {samples[still[0]]:g} from {from_s:.4g} "
-                           f"to {to_s:.4g} s, as of a cable that is out: add a column usable, 0 there and 1 elsewhere "
-                           "(1 everywhere if this is right)")
+                           f"to {to_s:.4g} s, as from a disconnected cable: add a column usable, 0 there and 1 "
+                           "elsewhere (1 everywhere if this is right)")
     times_s = track.start_s + np.arange(len(track.elevation_m)) / track.rate_hz
 
     def then(samples: Array) -> Array:

@@ -159,7 +159,7 @@ def summary(found: LabPlan) -> list[str]:
     count = len(found.drives)
     chances = found.now.chances
     named = int((chances > 0.5).sum())
-    from_where = ("as in the runs" if found.measured else "as given, or else usual")
+    from_where = ("as in the runs" if found.measured else "as given, or the usual one")
     lines = [f"ridelog diagnose would name {named} of {len(found.names)} effects, each alone and of usual strength, "
              f"from {count} drive{'s' * (count != 1)} of {seconds:.0f} s in all with noise of "
              f"{found.noise.variance**0.5:.3g} {found.unit} r.m.s. ({from_where})."]

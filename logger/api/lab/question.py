@@ -93,7 +93,7 @@ class DiagnoseQuestion(LabQuestion):
     _: KW_ONLY
     candidates: shared_fields.Candidates = None
     effect_files: shared_fields.EffectFiles = ()
-    list_all: Annotated[bool, "the words list all candidates, not the first 8"] = False
+    list_all: Annotated[bool, "list all candidates, not only the first 8"] = False
     same_road: Annotated[bool, question.Option(
         "without a profile: two runs or more (folders, or drive.csv files) over one road at different speeds; "
         "nonlinear effects are tried in linearised form")] = False
@@ -130,7 +130,7 @@ class AddEffectQuestion(LabQuestion):
     runs: shared_fields.TrackedRuns
     _: KW_ONLY
     start: Annotated[Mapping[str, float] | None,
-                     "numbers by name, where the fit begins; of several effects each takes its own"] = None
+                     "values by parameter name, where the fit begins; each effect takes its own"] = None
 
     @property
     def names(self) -> list[str]:
@@ -202,7 +202,7 @@ class PlanQuestion(LabQuestion):
 
     vehicle: shared_fields.VehicleName
     runs: Annotated[shared_fields.Runs, question.Argument(
-        "folder with drive.csv and profile.csv, or of a rig excitation.csv", metavar="RUN", read=Path, many=list)] = ()
+        "folder with drive.csv and profile.csv (of a rig: excitation.csv)", metavar="RUN", read=Path, many=list)] = ()
     _: KW_ONLY
     profile: Annotated[Union["Wheelpaths", Path, str, None], question.Option(
         "the road of planned drives, and of the next one (default: that of the longest run)", metavar="FILE",
@@ -214,7 +214,7 @@ class PlanQuestion(LabQuestion):
         "r.m.s. of the sensor's noise [m/s2] (default: that of the runs; without runs a usual one)", question.NOISE,
         "MPS2")] = None
     step_mps2: Annotated[float, question.Option(
-        "the planned sensor gives whole multiples of this only [m/s2]", question.ADDED, "MPS2")] = 0.0
+        "step to which the planned sensor rounds [m/s2]", question.ADDED, "MPS2")] = 0.0
     candidates: shared_fields.Candidates = None
     effect_files: shared_fields.EffectFiles = ()
 

@@ -36,7 +36,7 @@ def looks_like(shape: Shape) -> list[str]:
     """What a residual that no candidate explains looks like."""
     turns = [line_sentence(shape.line)] if shape.line is not None and shape.line.found else []
     found = turns + [test.sentence for test in shape.tests.found]
-    return found or ["No test says more: the residual is spread over all frequencies, speeds and places."]
+    return found or ["No test finds more: the residual is spread over all frequencies, speeds and places."]
 
 
 def line_sentence(line: SpatialLine) -> str:
@@ -171,7 +171,7 @@ def error_words(steps: Sequence[ErrorStep], floor: float) -> list[str]:
     if rises := rising(steps):
         said = enumerated([_ERROR_WORDS.get(one, one) for one in rises], "and")
         lines.append(f"It rises {said}: what fits the other stretches need not fit those held out. On roads a fit also "
-                     "weighs each frequency by its noise, while the NRMSE counts all alike.")
+                     "weights each frequency by its noise, while the NRMSE counts all equally.")
     return lines
 
 

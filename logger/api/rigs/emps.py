@@ -75,8 +75,8 @@ def _record(folder: Path) -> tuple[Array, Array]:
 
 def _verdict(found: rig_sets.Improved, linear: float, better: float) -> str:
     names = " and ".join(found.diagnosis.verdict) or "nothing"
-    return (f"diagnose names {names}. The force that moves the axis is off by {better:.3f} of its r.m.s., {linear:.3f} "
-            "as a linear axis with mass and viscous friction alone.")
+    return (f"diagnose names {names}. The error of the force that moves the axis is {better:.3f} of its r.m.s., "
+            f"{linear:.3f} with mass and viscous friction alone.")
 
 
 def _beside(found: rig_sets.Improved, ours: Sequence[float]) -> Table:
@@ -92,11 +92,11 @@ def _beside(found: rig_sets.Improved, ours: Sequence[float]) -> Table:
 
 _DOWNLOAD = "download the EMPS files from nonlinearbenchmark.org and unpack them; DATA_EMPS is read"
 STUDY = Study(
-    "emps", "A linear axis that rubs: what is missing of its force", "Numbers of the axis",
+    "emps", "A linear axis with friction: what its model lacks", "Numbers of the axis",
     "The training record is written as a user would: a component whose bench moves it (the encoder's place) while its "
     "force is measured, and a file with a mass known to 20 % and viscous friction to 50 %.",
     rig_sets.rig_from_folder("the EMPS record", _DOWNLOAD, run),
-    (Item("EMPS friction", Word.AGREES, "Coulomb friction is found by name, and the force is twice as near with it."),
+    (Item("EMPS friction", Word.AGREES, "diagnose names Coulomb friction, which halves the error of the force."),
      Item("EMPS numbers", Word.AGREES, "Mass, viscous and Coulomb friction within 1 %.")),
     source="A. Janot, M. Gautier, M. Brunot, Nonlinear System Identification Benchmarks, 2019",
     data=f"the EMPS record ({_DOWNLOAD})")

@@ -79,20 +79,20 @@ def _verdict(found: rig_sets.Improved, linear: list[float], better: list[float])
     names = " and ".join(found.diagnosis.verdict) or "nothing"
     return (f"diagnose names {names}. On the multisine that no fit has seen the simulated output is off by "
             f"{better[0]:.2f} mV, {linear[0]:.2f} mV as a linear rig; on the arrow by {better[1]:.2f} mV instead of "
-            f"{linear[1]:.2f} mV. The model has one number more than a linear one and holds beyond the amplitudes of "
-            "the fit, where a black box has to extrapolate.")
+            f"{linear[1]:.2f} mV. The model has one parameter more than a linear one and holds beyond the amplitudes "
+            "of the fit, where a black box has to extrapolate.")
 
 
 _DOWNLOAD = "download SilverboxFiles.zip from nonlinearbenchmark.org and unpack it; SNLS80mV is read"
 STUDY = Study(
-    "silverbox", "A mass on a hardening spring: what is missing, and how well it is simulated then",
+    "silverbox", "A mass on a hardening spring: what its model lacks, and how well it then predicts",
     "Errors of the benchmark's tests", "The record is written as a user would: run folders with the force and the "
     "displacement, and a file of a single mass whose mass and spring are known to 20 % and its damper to 50 %. "
     f"diagnose and add-effect see the first {FITTED} samples of the part for fitting, and nothing of the tests. The "
     f"first {_SKIP} samples of each test are left out, as published.",
     rig_sets.rig_from_folder("the Silverbox", _DOWNLOAD, run),
-    (Item("Silverbox equation", Word.AGREES, "The cubic spring of the circuit is found by name."),
-     *(Item(name, Word.BETTER, "The simulated output is nearer than that of the best published network.")
+    (Item("Silverbox equation", Word.AGREES, "diagnose names the cubic spring of the circuit."),
+     *(Item(name, Word.BETTER, "The simulated output is closer to the record than that of the best published network.")
        for name, _ in TESTS)),
     source="T. Wigren, J. Schoukens, ECC 2013; networks: M. D. Champneys et al., arXiv 2405.10779",
     data=f"the Silverbox ({_DOWNLOAD})")
