@@ -617,9 +617,9 @@ class DatedSamples:
         """What is wrong with the samples that come, and what to ``check``; empty: nothing."""
         if self.clock.refused_hz is not None:
             return (f"it gives about {self.clock.refused_hz:.0f} samples a second, unsteadily or too few, where "
-                    f"{self._rate_hz:g} are expected: ridelog makes no rows of them. {check}")
+                    f"{self._rate_hz:g} are expected: ridelog makes no rows from them. {check}")
         if self.clock.too_many_lost:
-            return f"too many samples are lost to locate each: ridelog makes no rows of the others. {check}"
+            return f"too many samples are lost to locate each: ridelog makes no rows from the others. {check}"
         if self.clock.lost_share >= WORTH_TELLING:
             return f"{100 * self.clock.lost_share:.1f} of 100 samples are lost, and their rows flagged gap. {check}"
         return self.burst_doubt

@@ -155,11 +155,12 @@ class PascoDecoder:
         usual = f"{self._profile.rate_hz:g}"
         if self._clock.refused_hz is not None:
             return (f"it sends about {self._clock.refused_hz:.0f} samples a second, unsteadily or too few, where the "
-                    f"profile {self._profile.name} says {usual}: no rows are made of them. Set the device to {usual} a "
-                    "second, or find what loses them (lost lines: baud rate at both ends, cable, a busy bridge)")
+                    f"profile {self._profile.name} says {usual}: ridelog makes no rows from them. Set the device to "
+                    f"{usual} a second, or find what loses them (lost lines: baud rate at both ends, cable, a busy "
+                    "bridge)")
         if self._clock.too_many_lost:
-            return ("too many samples are lost on the line to locate each: ridelog makes no rows of the others. Check "
-                    "the baud rate at both ends, the cable, and whether the bridge keeps up")
+            return ("too many samples are lost on the line to locate each: ridelog makes no rows from the others. "
+                    "Check the baud rate at both ends, the cable, and whether the bridge keeps up")
         if self._clock.lost_share >= WORTH_TELLING:
             return (f"{100 * self._clock.lost_share:.1f} of 100 samples are lost on the line, and their rows flagged "
                     "gap: check the baud rate at both ends, the cable, and whether the bridge keeps up")

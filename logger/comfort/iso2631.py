@@ -351,7 +351,7 @@ def ride_comfort(accel_mps2: dict[str, Array | None], rate_hz: float, weighting:
         raise ValueError(f"expected at least {LOWEST_RATE_HZ:g} samples a second, found {rate_hz:.4g}"
                          f"{time_hint(rate_hz)}")
     if taken_hz is not None and taken_hz < LEAST_TAKEN_HZ:
-        raise ValueError(f"expected at least {LEAST_TAKEN_HZ:g} samples a second that were taken, found {taken_hz:.4g}")
+        raise ValueError(f"expected at least {LEAST_TAKEN_HZ:g} measured samples a second, found {taken_hz:.4g}")
     if duration_s < shortest_s:
         raise ValueError(f"expected at least {shortest_s:g} s, found {duration_s:.3g} s")
     weighted_mps2 = _weighed(weighting, vertical, rate_hz)

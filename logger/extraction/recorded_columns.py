@@ -146,8 +146,8 @@ def even_samples(time_s: Array, samples: Array, rate_hz: float, range_end: float
                          "time right?")
     if own_hz < LEAST_RATE_HZ:
         also = f" written at {len(time_s) / (time_s[-1] - time_s[0]):.3g} Hz" if dropped > 0 else ""
-        raise ValueError(f"expected {LEAST_RATE_HZ:g} samples a second or more that were taken, found {own_hz:.3g}"
-                         f"{also}: set the program to a higher rate")
+        raise ValueError(f"expected {LEAST_RATE_HZ:g} measured samples a second or more, found {own_hz:.3g}{also}: set "
+                         "the program to a higher rate")
     laid = [_laid(*one, own_hz, rate_hz) for one in taken]
     times_s, values, present, ends_met = (np.concatenate(part) for part in list(zip(*laid, strict=True))[:4])
     return EvenSamples(times_s, values, present, ends_met, own_hz, dropped, all(one[4] for one in laid),

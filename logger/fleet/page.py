@@ -100,8 +100,8 @@ def figures_words(figures: FleetFigures) -> str:
     if why := not_known(figures):
         lines.append(why)
     if isfinite(biases.pass_std):
-        lines.append(f"One pass over 66 ft of road is {biases.pass_std:.1%} off (standard deviation), of which "
-                     f"{biases.session_std:.1%} are shared by all passes of a session")
+        lines.append(f"The standard error of one pass over 66 ft of road is {biases.pass_std:.1%}, of which "
+                     f"{biases.session_std:.1%} is shared by all passes of a session")
     if isfinite(biases.growth_per_year):
         lines.append(f"The mean road changes by {biases.growth_per_year:+.1%} a year")
     return "\n".join([*lines, "", *_words_cars(figures), "", *_roads(roads), "", *_changes(roads)])

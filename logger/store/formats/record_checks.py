@@ -184,7 +184,7 @@ def even_columns(columns: Mapping[str, Array], file: str, asked: RecordRules) ->
     found = even_record(columns[TIME], {VERTICAL: columns[VERTICAL]}, {name: columns[name] for name in names}, file,
                         asked, moving)
     if found.resampled is not None and found.resampled.from_hz < least_for_roads_hz:
-        raise BadInput(f"{file}: expected at least {least_for_roads_hz:g} samples a second that were taken, found "
+        raise BadInput(f"{file}: expected at least {least_for_roads_hz:g} measured samples a second, found "
                        f"{found.resampled.from_hz:.4g}")
     return found
 
@@ -237,7 +237,7 @@ def even_times_of(t_s: Array, file: str) -> Array:
         try:
             return repeated_samples.spread(t_s, ends)
         except ValueError as error:
-            raise BadInput(f"{file}: expected samples that were taken at some even rate, {error}") from None
+            raise BadInput(f"{file}: expected samples measured at an even rate, {error}") from None
     check_grows(t_s, file)
     return t_s
 
