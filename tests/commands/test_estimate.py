@@ -305,8 +305,8 @@ def test_a_short_drive_has_windows_without_a_profile(
     assert main(asked) == 0
     out, err = capsys.readouterr()
     assert any(line.startswith("IRI ") for line in out.splitlines())
-    why = (f"ridelog: {drive}: No profile in {road}: the readings resolve no wavelengths over a stretch longer than "
-           "the longest of them")
+    why = (f"ridelog: {drive}: No profile in {road}: no stretch is longer than the longest wavelength that the "
+           "readings resolve")
     assert err.startswith(why)
     assert windows.read_text().count("\n") > 10
     assert main([*asked, "--json"]) == 0
