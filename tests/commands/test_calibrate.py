@@ -161,5 +161,5 @@ def test_files_that_are_not_there_or_in_the_way(car: Path) -> None:
         main(["calibrate", "--vehicle", "trabant"])
     with pytest.raises(BadInput, match=r"trabant\.yaml"):
         main(["calibrate", "--vehicle", "trabant.yaml"])
-    with pytest.raises(BadInput, match="another file than those that are read"):
+    with pytest.raises(BadInput, match="a file other than the input"):
         main(["calibrate", "--vehicle", str(car), "--out", str(car)])

@@ -330,8 +330,8 @@ def test_no_file_is_written_over_another(folder: Path, tmp_path: Path) -> None:
     for arguments in (("--out", run / "drive.csv"), ("--profile-out", run / "profile.csv"), ("--out", car),
                       ("--profile-out", run / ".." / "run" / "drive.csv"), ("--out", run / "p-2.csv"),
                       ("--out", new, "--profile-out", tmp_path / "run" / ".." / "new.csv")):
-        expected = ("every file to be another one",) if new in arguments else (
-            "another file than those that are read", "a file that does not belong to a run")
+        expected = ("a different file each time",) if new in arguments else (
+            "a file other than the input", "a file that does not belong to a run")
         complaints = [f"{arguments[-2]} {arguments[-1]}: expected {words}" for words in expected]
         assert refusal(run, *map(str, arguments), car=str(car)) in complaints
     for start, *arguments in ((run, "--profile-out", run / "p.csv"),

@@ -603,7 +603,7 @@ def test_a_number_far_from_what_its_file_knows_is_named(tmp_path: Path, capsys: 
     (tmp_path / "bench.yaml").write_text(bench.yaml.replace("2000.0", "1800 +- 2%"))
     run = written(tmp_path / "run", record, {"force_n": push(TIME_S)}, BODY)
     assert main(["identify", "--vehicle", str(tmp_path / "bench.yaml"), str(run)]) == 0
-    assert "stiffness_n_per_m came out 5.3 standard deviations from what" in " ".join(
+    assert "stiffness_n_per_m came out 5.3 standard deviations from its prior in" in " ".join(
         "".join(capsys.readouterr()).split())
 
 

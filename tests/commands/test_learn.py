@@ -32,7 +32,7 @@ def test_a_name_that_is_no_law_is_refused(out: str, says: str, plain_run: Path, 
 
 def test_a_page_is_not_the_law(plain_run: Path, tmp_path: Path) -> None:
     law = str(tmp_path / "law.py")
-    for page, complaint in ((law, "every file to be another one"), (str(tmp_path / "page.png"), r"a file that ends")):
+    for page, complaint in ((law, "a different file each time"), (str(tmp_path / "page.png"), r"a file that ends")):
         with pytest.raises(BadInput, match=f"--out .*: expected {complaint}"):
             main(["learn", "--vehicle", "rav4-2009", "--out", law, "--out", page, str(plain_run)])
 

@@ -608,7 +608,7 @@ def check_record(drive: Drive, file: Path, others: Sequence[Drive], vehicle: Veh
     is_acceleration = drive.facts.main.measures == "acceleration"
     if np.ptp(counted) == 0:
         unit = " m/s2" if is_acceleration else ""
-        found = f"{counted[0]:g}{unit} all along" if counted[0] else "zeros only"
+        found = f"{counted[0]:g}{unit} throughout" if counted[0] else "zeros only"
         what = "accelerations" if is_acceleration else drive.facts.main.name
         raise BadInput(f"{file}: expected {what} after the first {past_s:g} s, found {found}")
     check_decay(drive, file)
