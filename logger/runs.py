@@ -227,11 +227,11 @@ class Run:
         """Of which samples (n,) something was read."""
         return np.ones(self.count, bool) if self.usable is None else np.asarray(self.usable != NO_READING)
 
-    def cut(self, count: int) -> Run:
-        """Its first samples, of which more than the beginning has to be left."""
-        return replace(self, measured_mps2=self.measured_mps2[:count], distance_m=self.distance_m[:count],
-                       speed_mps=self.speed_mps[:count], more=self.more[:, :count],
-                       usable=None if self.usable is None else self.usable[:count])
+    def part(self, samples: slice) -> Run:
+        """Some of its samples, of which more than the beginning has to be left."""
+        return replace(self, measured_mps2=self.measured_mps2[samples], distance_m=self.distance_m[samples],
+                       speed_mps=self.speed_mps[samples], more=self.more[:, samples],
+                       usable=None if self.usable is None else self.usable[samples])
 
     def residual(self, prediction: Array, measured_mps2: Array | None = None) -> Array:
         """Measured minus predicted (n,), or of more signals joined to it [m/s2]; with ``measured_mps2`` (n,), of these

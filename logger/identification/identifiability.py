@@ -26,8 +26,8 @@ from logger.vehicle.named_parameters import WEAKEST
 
 SILENT, TOGETHER, WEAK, UNEXPLAINED = "silent", "together", "weak", "unexplained"
 TURNED, APART = "turned", "apart"
-NOTHING_EXACT, NOTHING_BY_DIFFERENCES = 1e-7, 1e-4
-"""What counts as nothing, relative, where derivatives are exact and where they are differences."""
+NOTHING = 1e-4
+"""What counts as nothing, relative, of derivatives that are differences."""
 NOT_ONE_ROAD = ("It is not the same road, not the same line on it, or their distances disagree by more than ridelog "
                 "can correct")
 # Of a direction is named what has this share of its largest change, or of the largest trace that one alone would leave.
@@ -68,7 +68,7 @@ def beside(start: Array, count: int, low: Array, high: Array) -> Array:
     return np.clip(moved, low, high)
 
 
-def structural(names: Sequence[str], derivatives: Array, size: float, nothing: float) -> list[Finding]:
+def structural(names: Sequence[str], derivatives: Array, size: float, nothing: float = NOTHING) -> list[Finding]:
     """What no amount of such data could determine.
 
     derivatives    (N, p) of the predictions by the relative change of each number

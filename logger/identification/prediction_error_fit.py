@@ -25,8 +25,6 @@ from logger.arrays import Array
 from logger.dsp.filters import DecimatingLowPass
 from logger.fitting.levenberg_marquardt import Minimum, minimise
 from logger.identification.identifiability import (
-    NOTHING_BY_DIFFERENCES,
-    NOTHING_EXACT,
     Finding,
     NotIdentifiable,
     beside,
@@ -56,7 +54,7 @@ _ROOT_STEPS = 60
 
 class Predictor(Protocol):
     """What can be fitted: numbers in, one prediction per record out, as long as what was measured; and its derivatives,
-    exact ones at the price of a prediction, or differences of predictions."""
+    differences of predictions."""
 
     @property
     def parameters(self) -> Sequence[Free]: ...
@@ -255,7 +253,7 @@ class _FitProblem:
 
     def at(self, x: Array, noise: Whitening) -> _Point:
         """The residuals at a place, weighed by a noise model."""
-        predictions = self.linearised(x).predictions if self.exact else self._behind(self._predicted(x))
+        predictions = self._filtered(self.model.predict(self.coordinates.values(x)))
         plain = [seen - one for seen, one in zip(self.observed, predictions, strict=True)]
         white = noise(plain)
         cost = 0.5 * float(white @ white + self.pull(x) @ (self.mean - x))
@@ -267,31 +265,22 @@ class _FitProblem:
         if known is None or not np.array_equal(known.x, x):
             values = self.coordinates.values(x)
             predictions, slopes = self.model.linearised(values)
-            self._check(predictions)
             scale = self.coordinates.slopes(values)
-            known = _Linearised(x, self._behind(predictions), [self.low_pass.apply(one) * scale for one in slopes])
+            known = _Linearised(x, self._filtered(predictions), [self.low_pass.apply(one) * scale for one in slopes])
             self._linearised = known
         return known
 
-    def _predicted(self, x: Array) -> list[Array]:
-        predictions = self.model.predict(self.coordinates.values(x))
-        self._check(predictions)
-        return predictions
-
-    def _check(self, predictions: Sequence[Array]) -> None:
+    def _filtered(self, predictions: Sequence[Array]) -> list[Array]:
         if [len(one) for one in predictions] != [len(one) for one in self.measured]:
             raise ValueError("expected measurements as long as the predictions")
-
-    def _behind(self, parts: Sequence[Array]) -> list[Array]:
-        return [self.low_pass.apply(one) for one in parts]
+        return [self.low_pass.apply(one) for one in predictions]
 
     def structural_findings(self, x: Array) -> list[Finding]:
         """What no such data could determine at a place."""
         here = self.linearised(x)
         size = float(np.sqrt(sum((one**2).sum() for one in here.predictions)))
         known = size * np.diag(self.precision > 0)
-        return structural([one.name for one in self.free], np.concatenate([*here.slopes, known]), size,
-                          NOTHING_EXACT if self.exact else NOTHING_BY_DIFFERENCES)
+        return structural([one.name for one in self.free], np.concatenate([*here.slopes, known]), size)
 
 
 # --- descent ---
@@ -311,8 +300,7 @@ def _descend(problem: _FitProblem, start: Array, noise: Whitening) -> Minimum[_P
     close = _CLOSE if problem.exact else _CLOSE_SIMULATED
     return minimise(start, lambda x: problem.at(x, noise), normal_equations,
                     small_gain=lambda point: close**2 * point.cost / len(point.white),
-                    most_rounds=_MOST_STEPS, keep_derivatives=not problem.exact,
-                    low=problem.low, high=problem.high, longest_step=_LONGEST_STEP)
+                    most_rounds=_MOST_STEPS, low=problem.low, high=problem.high, longest_step=_LONGEST_STEP)
 
 
 def _innovations(problem: _FitProblem, point: _Point) -> tuple[Whitening, _Point, int, bool]:

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -20,21 +21,22 @@ import numpy as np
 from logger.arrays import Array
 from logger.dsp.filters import DecimatingLowPass
 from logger.dsp.repeated_samples import find_repeats
-from logger.identification.drive_model import DriveModel, SimulatedModel, VehicleModel
+from logger.identification.drive_model import DriveModel
 from logger.identification.identifiability import WEAK, NotIdentifiable, upside_down
 from logger.identification.noise_models import Autoregressive, NoiseModel, RoadNoise, White
 from logger.identification.prediction_error_fit import Fit, FitOptions, fit, spread_starts
 from logger.identification.unknown_inputs import EACH, RoadInput, expanded
 from logger.identification.unknown_road.road_operator import RoadDrive
-from logger.runs import READING, SENSOR, Past, Run, normalised_rms
-from logger.vehicle.effect import Chosen
-from logger.vehicle.named_parameters import Free
-from logger.vehicle.vehicle import OWN_NAMES, Vehicle
+from logger.profiles.track import Track
+from logger.runs import READING, Run, normalised_rms
+from logger.vehicle.models import structure_of
+from logger.vehicle.vehicle import Vehicle
 
 # Places are so much of a bump's width apart, and so many seconds of the way at most.
 _OF_WIDTH, _OF_TIME_S = 0.15, 0.05
 _MOST_PLACES = 4000
 _REFINED = 9
+_AFTER_S = 3.0  # a car that has passed an obstacle has come to rest
 
 
 def located(vehicle: Vehicle, record: Run, road: RoadInput, part: str) -> float:
@@ -53,22 +55,34 @@ def located(vehicle: Vehicle, record: Run, road: RoadInput, part: str) -> float:
         raise ValueError(f"{part}: expected a drive over it, found a car that stands")
     if count > _MOST_PLACES:
         raise ValueError(f"{part}: expected a start_m, as {last_m - first_m:g} m are too long to look for it")
-    place = f"{part}.start_m"
-    model = VehicleModel(vehicle, [Free(place, first_m, first_m - 1, last_m + 1, place=True)], [record], road)
-    without: Any = {part: None}
-    bare = VehicleModel(vehicle, [], [record], replace(road, **without)).predict(np.empty(0))[0]
-    coarse = _best(model, record.kept_mps2, bare, np.linspace(first_m, last_m, max(count, 2)))
-    return _best(model, record.kept_mps2, bare, coarse + apart_m * np.linspace(-1, 1, _REFINED))
+    find = partial(_best_place, vehicle, record, road, part)
+    return find(find(np.linspace(first_m, last_m, max(count, 2))) + apart_m * np.linspace(-1, 1, _REFINED))
 
 
-def _best(model: VehicleModel, measured: Array, bare: Array, places: Array) -> float:
-    """The place whose response, times the best factor above 0, leaves the least of what was ``measured``; ``bare`` is
-    the response without the obstacle."""
+def _best_place(vehicle: Vehicle, record: Run, road: RoadInput, part: str, places: Array) -> float:
+    """The place whose response, times the best factor above 0, leaves the least of the measurement. A linear car
+    answers an obstacle as on a flat road, from where it comes near until some time after it has passed."""
+    without: dict[str, Any] = {part: None}
+    bare = DriveModel(vehicle, [], [record], replace(road, **without)).predict(np.empty(0))[0]
+    left = np.concatenate([np.zeros(record.first), record.kept_mps2 - bare])
+    flat = replace(record, track=Track(1.0, np.zeros(2)), usable=None, skip_s=0.0)
+    way_m = record.distance_m / road.speed_scale
+    structure, obstacle = structure_of(vehicle), road.obstacles[part]
+    around_m = structure.contact_patch_m + float(np.abs(np.diff(way_m)).max())
+    reach_m = around_m + obstacle.length_m + float(np.max(structure.behind_m))
     gains = []
     for place in places:
-        felt = model.predict(np.array([place]))[0] - bare
+        beyond_m = way_m - place
+        near = np.flatnonzero((beyond_m > -around_m) & (beyond_m < reach_m))
+        if not len(near):
+            gains.append(0.0)
+            continue
+        passed = slice(max(near[0] - 1, 0), near[-1] + round(_AFTER_S * record.rate_hz))
+        there: dict[str, Any] = {part: replace(obstacle, start_m=place)}
+        felt = DriveModel(vehicle, [], [flat.part(passed)], RoadInput(speed_scale=road.speed_scale, **there)).predict(
+            np.empty(0))[0]
         power = float(felt @ felt)
-        gains.append(max(float(felt @ (measured - bare)), 0.0) ** 2 / power if power > 0 else 0.0)
+        gains.append(max(float(felt @ left[passed]), 0.0) ** 2 / power if power > 0 else 0.0)
     return float(places[int(np.argmax(gains))])
 
 
@@ -128,17 +142,6 @@ def obstacle_starts(
     """
     return {name: located(vehicle, record, road, part) for part in unplaced
             for name, record in zip(expanded(f"{EACH}.{part}.start_m", len(records)), records, strict=True)}
-
-
-def drive_model(vehicle: Vehicle, effects: Sequence[Chosen], parameters: Sequence[Free], records: Sequence[Run],
-                road: RoadInput) -> DriveModel:
-    """The model of these drives: in frequency where a car without effects drove, or stood on a rig that elevations
-    alone moved, and its acceleration was measured. ValueError as ``DriveModel``."""
-    benches = any(one.facts.main.name != SENSOR or one.past is Past.FREE
-                  or one.track.acts_on for one in records)
-    if effects or benches or vehicle.model in OWN_NAMES:
-        return SimulatedModel(vehicle, parameters, records, road, effects)
-    return VehicleModel(vehicle, parameters, records, road)
 
 
 def fit_options(model: DriveModel, noise: str, low_pass_hz: float | None, tries: int) -> FitOptions:

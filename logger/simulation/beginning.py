@@ -120,7 +120,7 @@ def _one_cycle(car: Car, passage: Passage, run: Run) -> tuple[Run, Passage]:
     places = passage.under_wheels(car.structure)[0][: run.count * passage.steps, 0]
     gone = np.searchsorted(np.cumsum(np.abs(np.diff(places))), 2 * np.ptp(places)) // passage.steps
     count = max(int(gone), 2 * run.first) + 2
-    return run.cut(count), passage.cut(count)
+    return run.part(slice(count)), passage.cut(count)
 
 
 def _towards(columns: Array, left: Array, usual: Array, state: Array, moves: int) -> Array:

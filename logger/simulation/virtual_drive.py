@@ -167,6 +167,16 @@ class SimulatedRuns:
         with np.errstate(over="ignore", invalid="ignore"):
             return [respond(car, passage) for passage in self._passages_of(car, distance_error_m)]
 
+    def roads(self, car: Car, distance_error_m: Sequence[Array], tracks: Sequence[WheelTracks]) -> list[Array]:
+        """Vertical acceleration of the road under the wheels (n, w) in each run [m/s2], as the recorder would keep it;
+        arguments as of ``predict``."""
+        def recorded_road(passage: Passage) -> Array:
+            elevation = passage.under_wheels(car.structure)[0][:, : len(car.structure.wheels)].T
+            accelerations = np.gradient(np.gradient(elevation, passage.step_s, axis=1), passage.step_s, axis=1)
+            return passage.recorded(accelerations, np.ones_like).T
+
+        return list(map(recorded_road, self._unbegun(car, distance_error_m, False, tracks)))
+
     def beginnings(self, car: Car, distance_error_m: Sequence[Array] | None = None, rough: bool = False
                    ) -> list[Beginning | None]:
         """How the runs begin with this car whose initial state nobody knows; None of the others."""

@@ -28,7 +28,7 @@ from logger.dsp.whole_record import in_band
 from logger.estimation.batch import estimated, exact_iri
 from logger.estimation.rms_calibration import rms_relation
 from logger.estimation.sensor_noise import Sensor
-from logger.identification.drive_model import VehicleModel
+from logger.identification.drive_model import DriveModel
 from logger.identification.noise_models import Autoregressive, NoiseModel, RoadNoise, White
 from logger.identification.prediction_error_fit import Fit, FitOptions, fit
 from logger.identification.unknown_inputs import SPEED_SCALE, Bump, RoadInput, free_input, is_input
@@ -249,7 +249,7 @@ def fitted(record: Run, start: Mapping[str, float], ours: bool, road: RoadInput 
     car = vehicle or rav4()
     numbers = [free_input(road, name, value) if is_input(name) else free(car, name, value)
                for name, value in start.items()]
-    model = VehicleModel(car, numbers, [record], road)
+    model = DriveModel(car, numbers, [record], road)
     noise: list[NoiseModel] = [White()]
     if ours:
         noise += [Autoregressive(), RoadNoise(model.road_spectra)]

@@ -9,8 +9,7 @@ what the laws add at the suspensions Z(s) and at the tires Y(s), the travel J an
 
 A force by all that moves at a wheel is a row of factors on q and z instead, and acts along J, W or their sum.
 
-A sensor on the body reads s2 r q. D is symmetric, so where the matrices hold all, one more solution, w of D w = s2 r,
-gives the derivative of the reading by any number of the car: s2 dr q + w (dR z - dD q).
+A sensor on the body reads s2 r q.
 """
 
 from __future__ import annotations
@@ -31,8 +30,8 @@ from logger.vehicle.simulate import recorder_gain
 from logger.vehicle.structure import Output, Structure, body_point
 from logger.vehicle.vehicle import Vehicle
 
-# Step of the differences that derivatives of matrices (exact: they are quadratic at most) and of roads are taken by.
-_RELATIVE_STEP = 1e-3
+# Step of differences, as a share: a mode of quality Q bends over a step h by (Q h)^2 / 6, and rounding is 1e-16 / h.
+_STEP = 1e-5
 
 
 def dynamic_stiffness(mass: Array, damping: Array, stiffness: Array, s: Complex) -> Complex:
@@ -286,65 +285,6 @@ def moved_by(per_motion: Complex, s: Complex, travel: Array, wheel: Array) -> tu
     return np.asarray(by_q), np.asarray(by_road)
 
 
-# --- and its derivatives ---
-
-
-@dataclass(frozen=True, eq=False)
-class Sensitivity:
-    """Derivatives of a car's matrices by one number; and, for one that moves the wheels or their patches, the cars a
-    little before and after, ``apart`` apart in it."""
-
-    mass: Array
-    damping: Array
-    stiffness: Array
-    road: Array
-    row: Array
-    before: LinearCar
-    after: LinearCar
-    apart: float
-
-    @property
-    def shifts_road(self) -> bool:
-        """Whether the road comes under the wheels at other times, or over other patches."""
-        before, after = self.before.structure, self.after.structure
-        return before.contact_patch_m != after.contact_patch_m or bool((before.behind_m != after.behind_m).any())
-
-
-def sensitivity(vehicle: Vehicle, one: Free) -> Sensitivity:
-    """How a car depends on one of its numbers, where it is now. ValueError as ``named_parameters.read``."""
-    value = read(vehicle, one.name)
-    step = _RELATIVE_STEP * (abs(value) if one.by_factors else one.usual or 1.0)
-    before, after = (LinearCar.of(changed(vehicle, {one.name: value + sign * step})) for sign in (-1, 1))
-    low, high, apart = before.structure, after.structure, 2 * step
-    return Sensitivity((high.mass - low.mass) / apart, (high.damping - low.damping) / apart,
-                       (high.stiffness - low.stiffness) / apart, (high.road - low.road) / apart,
-                       (after.output.row - before.output.row) / apart, before, after, apart)
-
-
-def solved(car: LinearCar, s: Complex, under: Complex) -> tuple[Complex, Complex]:
-    """q (f, x, n) and w (f, n) of a car whose matrices hold all, with D q = R z and D w = s2 r, for roads z (f, x, w),
-    or (1, x, w), under its wheels, at s (f,); its sensor reads s2 r q."""
-    structure = car.structure
-    dynamic = dynamic_stiffness(structure.mass, structure.damping, structure.stiffness, s)
-    forces = np.broadcast_to(_times(under, structure.road), (len(s), under.shape[1], len(structure.mass)))
-    columns = np.concatenate([forces, ((s * s)[:, None] * car.output.row)[:, None]], axis=1)
-    found = np.asarray(np.linalg.solve(dynamic, columns.swapaxes(1, 2)), np.complex128).swapaxes(1, 2)
-    return found[:, :-1], found[:, -1]
-
-
-def reading_slope(change: Sensitivity, s: Complex, under: Complex, q: Complex, w: Complex) -> Complex:
-    """Derivatives (f, x) of what the sensor reads by a number of the car, the road under its wheels staying what it is:
-    s2 dr q + w (dR z - dD q); arguments as of ``solved``, and its results."""
-    at = s[:, None, None]
-    force = _times(under, change.road) - at * (at * _times(q, change.mass) + _times(q, change.damping))
-    force = force - _times(q, change.stiffness)
-    return np.asarray((w[:, None] * force).sum(axis=2) + (s * s)[:, None] * (q @ change.row))
-
-
-def _times(rows: Complex, matrix: Array) -> Complex:
-    return np.asarray(np.tensordot(rows, matrix, (-1, 1)))
-
-
 class AxleResponse:
     """What the sensor reads per elevation under each axle, at a recorder's rate; left and right see the same road.
 
@@ -370,10 +310,16 @@ class AxleResponse:
 
     def responses(self, values: Array, f_hz: Array) -> tuple[Complex, Complex]:
         """Gains (x, f) [1/s2] behind the recorder's filter with these values (p,), and their derivatives (p, x, f)."""
-        vehicle, s = self.vehicle_with(values), np.asarray(2j * np.pi * f_hz)
-        car, axles = LinearCar.of(vehicle), np.eye(len(self.behind_m), dtype=np.complex128)[None, :, self._axle]
-        q, w = solved(car, s, axles)
-        filtered = recorder_gain(f_hz / self._rate_hz)
-        slopes = [reading_slope(sensitivity(vehicle, one), s, axles, q, w).T for one in self.parameters]
-        gains = filtered * (s * s) * (q @ car.output.row).T
-        return gains, filtered * np.array(slopes).reshape(-1, *gains.shape)
+        vehicle, filtered = self.vehicle_with(values), recorder_gain(f_hz / self._rate_hz)
+        of_axles = np.eye(len(self.behind_m))[self._axle]
+
+        def gains(of: Vehicle) -> Complex:
+            return np.asarray(filtered * (LinearCar.of(of).by_wheel(f_hz) @ of_axles).T)
+
+        slopes = []
+        for one, value in zip(self.parameters, values, strict=True):
+            step = _STEP * (abs(value) if one.by_factors else one.usual or 1.0)
+            low, high = (gains(changed(vehicle, {one.name: value + way * step})) for way in (-1, 1))
+            slopes.append((high - low) / (2 * step))
+        here = gains(vehicle)
+        return here, np.array(slopes).reshape(-1, *here.shape)

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.linalg import cho_factor, cho_solve, toeplitz
 
-from logger.identification.drive_model import SimulatedModel, VehicleModel
+from logger.identification.drive_model import DriveModel
 from logger.identification.identifiability import NotIdentifiable
 from logger.identification.noise_models import Autoregressive, NoiseModel, RoadNoise, White
 from logger.identification.prediction_error_fit import Fit, FitOptions, fit
@@ -72,7 +72,7 @@ def main() -> int:
 
 
 def fitted(record: Run, start: dict[str, float], noise: str = "auto") -> Fit:
-    model = VehicleModel(CAR, [free(CAR, name, value) for name, value in start.items()], [record])
+    model = DriveModel(CAR, [free(CAR, name, value) for name, value in start.items()], [record])
     kinds: dict[str, NoiseModel] = {"white": White(), "ar": Autoregressive(), "road": RoadNoise(model.road_spectra)}
     return fit(model, model.measured, FitOptions(noise=list(kinds.values()) if noise == "auto" else [kinds[noise]]))
 
@@ -143,7 +143,7 @@ def draws(figures: Figures) -> None:
 def bounds(record: Run) -> tuple[Array, Array]:
     """Relative Cramer-Rao bounds: from the response to the bump alone, in noise whose spectrum is known; and with what
     that spectrum says of the car as well, the levels of road and sensor being unknown."""
-    model = VehicleModel(CAR, [free(CAR, name) for name in TABLE], [record])
+    model = DriveModel(CAR, [free(CAR, name) for name in TABLE], [record])
     truth = np.array(list(TABLE.values()))
     f_hz = np.arange(GRID // 2 + 1) * RATE_HZ / GRID
     inside = (f_hz / BUMP_MPS >= LOWEST_CPM) & (f_hz / BUMP_MPS <= HIGHEST_CPM)
@@ -174,7 +174,7 @@ def eight(figures: Figures) -> None:
     truth = changed(replace(CAR, sensor=SensorPlace(0.8)), {REAR: 25_000.0, free_names[5]: 1600.0})
     records = [road_record(truth, 60.0, speed, seed) for seed, speed in enumerate((8.0, 13.0, 18.0, 25.0))]
     began, began_s = time.perf_counter(), time.process_time()
-    model = VehicleModel(truth, [free(truth, name, 1.2 * value_of(truth, name)) for name in free_names], records)
+    model = DriveModel(truth, [free(truth, name, 1.2 * value_of(truth, name)) for name in free_names], records)
     found = fit(model, model.measured)
     took, processor_s = time.perf_counter() - began, time.process_time() - began_s
     errors = [found.parameters[name] / value_of(truth, name) - 1 for name in free_names]
@@ -210,13 +210,13 @@ def unknown_bump(figures: Figures) -> None:
     for record in records:
         wanted = [free(CAR, MASS, 700.0), *(free_input(road, name) for name in list(truth)[1:])]
         began = time.process_time()
-        model = VehicleModel(CAR, wanted, [record], road)
+        model = DriveModel(CAR, wanted, [record], road)
         found = fit(model, model.measured)
         times.append(time.process_time() - began)
         errors.append([found.parameters[name] - value for name, value in truth.items()])
         expected.append(list(found.standard_errors.values()))
     known = RoadInput(bump=Bump(2.0, 0.15, 2.6))
-    model = VehicleModel(CAR, [free(CAR, MASS), *(free_input(known, name) for name in list(truth)[1:])], records[:1],
+    model = DriveModel(CAR, [free(CAR, MASS), *(free_input(known, name) for name in list(truth)[1:])], records[:1],
                          known)
     slopes = model.linearised(np.array(list(truth.values())))[1][0]
     bound = NOISE_MPS2 * np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
@@ -234,7 +234,7 @@ def rubbing(figures: Figures) -> None:
     assert move is not None
     errors, times = [], []
     for seed in range(RUBBING_DRAWS):
-        model = SimulatedModel(CAR, [free(CAR, MASS, 800.0), free_number(there, move)],
+        model = DriveModel(CAR, [free(CAR, MASS, 800.0), free_number(there, move)],
                                [rubbing_run(seed, road_seed=seed % RUBBING_ROADS)], effects=there)
         noise: list[NoiseModel] = [White(), Autoregressive(), RoadNoise(model.road_spectra)]
         began = time.process_time()
@@ -265,7 +265,7 @@ def passes(figures: Figures) -> None:
                 records.append(replace(clean, track=flat, measured_mps2=clean.measured_mps2 + NOISE_MPS2 * noise))
             numbers = [*(free(CAR, name, 0.9 * value) for name, value in wanted.items()),
                        *(free_input(road, name) for name in expanded("each.bump.start_m", 3))]
-            model = VehicleModel(CAR, numbers, records, road)
+            model = DriveModel(CAR, numbers, records, road)
             found = fit(model, model.measured, FitOptions(noise=[RoadNoise(model.road_spectra)]))
             reported = with_common_roughness(model, found).fit
             errors.append([found.parameters[name] / value - 1 for name, value in wanted.items()])
@@ -373,7 +373,7 @@ def no_answer_without_a_road(figures: Figures) -> None:
 
 def fitted_input(car: Vehicle, record: Run, road: RoadInput, wanted: list[str]) -> Fit:
     numbers = [free_input(road, name) if is_input(name) else free(car, name) for name in wanted]
-    model = VehicleModel(car, numbers, [record], road)
+    model = DriveModel(car, numbers, [record], road)
     return fit(model, model.measured, FitOptions(noise=[White()]))
 
 
@@ -382,7 +382,7 @@ def response_of(wanted: list[str]) -> AxleResponse:
 
 
 def refused(car: Vehicle, record: Run, wanted: list[str]) -> str:
-    model = VehicleModel(car, [free(car, name) for name in wanted], [record])
+    model = DriveModel(car, [free(car, name) for name in wanted], [record])
     try:
         fit(model, model.measured)
     except NotIdentifiable as refusal:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.identification.drive_model import VehicleModel
+from logger.identification.drive_model import DriveModel
 from logger.identification.identifiability import SILENT, TOGETHER, WEAK, NotIdentifiable, statistical, structural
 from logger.identification.prediction_error_fit import fit
 from logger.runs import Run
@@ -26,7 +26,7 @@ INERTIA, DAMPER = "pitch_inertia_kg_m2", "rear.suspension_damping_n_s_per_m"
 
 
 def refusal(car: Vehicle, record: Run, *wanted: str) -> NotIdentifiable:
-    model = VehicleModel(car, [free(car, name) for name in wanted], [record])
+    model = DriveModel(car, [free(car, name) for name in wanted], [record])
     with pytest.raises(NotIdentifiable) as caught:
         fit(model, model.measured)
     return caught.value
@@ -43,7 +43,7 @@ def test_the_inertia_of_a_symmetric_car_read_at_its_centre(others: tuple[str, ..
 
 def test_a_sensor_ahead_of_the_centre_sees_the_inertia() -> None:
     car = replace(CAR, sensor=SensorPlace(1.0))
-    model = VehicleModel(car, [free(car, INERTIA, 1400.0)], [bump_record(car)])
+    model = DriveModel(car, [free(car, INERTIA, 1400.0)], [bump_record(car)])
     found = fit(model, model.measured)
     assert found.parameters[INERTIA] == pytest.approx(1100, abs=4 * found.standard_errors[INERTIA])
     assert found.standard_errors[INERTIA] < 0.004 * 1100
@@ -60,7 +60,7 @@ def test_masses_rates_and_dampers_share_one_scale(known: str | None) -> None:
         assert [finding.kind for finding in error.findings] == [TOGETHER]
         assert set(error.findings[0].direction) == set(EVERYTHING)
     else:
-        model = VehicleModel(car, [free(car, name) for name in wanted], [record])
+        model = DriveModel(car, [free(car, name) for name in wanted], [record])
         found = fit(model, model.measured)
         assert max(found.standard_errors[name] / found.parameters[name] for name in wanted) < 0.2
 

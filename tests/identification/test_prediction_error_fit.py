@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
-from logger.identification.drive_model import VehicleModel
+from logger.identification.drive_model import DriveModel
 from logger.identification.identifiability import UNEXPLAINED, NotIdentifiable
 from logger.identification.noise_models import Autoregressive, RoadNoise, White
 from logger.identification.prediction_error_fit import Fit, FitOptions, fit, spread_starts
@@ -29,7 +29,7 @@ WHITE = [White()]
 
 
 def mass_fit(start: float = 700.0, options: FitOptions | None = None) -> Fit:
-    model = VehicleModel(CAR, [free(CAR, MASS, start)], [BUMP])
+    model = DriveModel(CAR, [free(CAR, MASS, start)], [BUMP])
     return fit(model, model.measured, options)
 
 
@@ -51,7 +51,7 @@ class Line:
 
 def test_without_noise_it_is_the_truth() -> None:
     names = [MASS, "front.suspension_stiffness_n_per_m", "rear.suspension_damping_n_s_per_m", "contact_patch_m"]
-    model = VehicleModel(CAR, [free(CAR, name, 1.3 * free(CAR, name).start) for name in names],
+    model = DriveModel(CAR, [free(CAR, name, 1.3 * free(CAR, name).start) for name in names],
                          [bump_record(CAR, noise_mps2=0.0), road_record(CAR, 20.0, 12.0, 1, noise_mps2=0.0)])
     found = fit(model, model.measured)
     assert found.converged
@@ -67,7 +67,7 @@ def test_scipy_on_the_stepping_simulation_says_the_same() -> None:
     theirs = least_squares(residuals, [0.9, 1.1], diff_step=1e-4)
     deviation = np.sqrt(2 * theirs.cost / (BUMP.count - 2))
     errors = deviation * np.sqrt(np.diag(np.linalg.inv(theirs.jac.T @ theirs.jac)))
-    model = VehicleModel(CAR, [free(CAR, MASS, 790), free(CAR, RATE, 25_000)], [BUMP])
+    model = DriveModel(CAR, [free(CAR, MASS, 790), free(CAR, RATE, 25_000)], [BUMP])
     ours = fit(model, model.measured, FitOptions(noise=WHITE))
     unit = np.array([875, 23_088])
     assert np.array(list(ours.parameters.values())) / unit == pytest.approx(theirs.x, abs=2e-3 * errors.min())
@@ -90,7 +90,7 @@ def test_errors_are_those_of_the_formats() -> None:
 
 
 def test_bounds_hold_and_are_reported() -> None:
-    model = VehicleModel(CAR, [free(CAR, MASS, 600, (500, 700)), free(CAR, RATE)], [BUMP])
+    model = DriveModel(CAR, [free(CAR, MASS, 600, (500, 700)), free(CAR, RATE)], [BUMP])
     found = fit(model, model.measured)
     assert found.parameters[MASS] == pytest.approx(700)
     assert found.at_bound == [MASS]
@@ -121,7 +121,7 @@ def test_a_line_is_a_regression() -> None:
 
 def test_a_low_pass_leaves_out_what_is_only_noise() -> None:
     hum = 2.0 * np.sin(2 * np.pi * 33.0 * BUMP.time_s)
-    model = VehicleModel(CAR, [free(CAR, MASS, 700)], [BUMP])
+    model = DriveModel(CAR, [free(CAR, MASS, 700)], [BUMP])
     plain, low = (fit(model, [model.measured[0] + hum], FitOptions(noise=WHITE, low_pass_hz=one))
                   for one in (None, 20.0))
     assert low.standard_errors[MASS] < 0.1 * plain.standard_errors[MASS]
@@ -144,7 +144,7 @@ def test_a_rough_road_outside_the_model() -> None:
     scores, levels = [], []
     for seed in range(6):
         record = bump_record(CAR, 12.0, seed=seed, iri_outside=5.0, start_m=8.0)
-        model = VehicleModel(CAR, [free(CAR, MASS, 1000), free(CAR, RATE, 20_000)], [record])
+        model = DriveModel(CAR, [free(CAR, MASS, 1000), free(CAR, RATE, 20_000)], [record])
         found = fit(model, model.measured, FitOptions(noise=[White(), Autoregressive(), RoadNoise(model.road_spectra)]))
         assert (found.noise.name, found.converged) == ("road", True)
         scores += [(found.parameters[MASS] - 875) / found.standard_errors[MASS]]
@@ -154,21 +154,21 @@ def test_a_rough_road_outside_the_model() -> None:
 
 
 def test_what_is_not_asked_right() -> None:
-    model = VehicleModel(CAR, [free(CAR, MASS)], [BUMP])
+    model = DriveModel(CAR, [free(CAR, MASS)], [BUMP])
     with pytest.raises(ValueError, match="as long as the predictions"):
         fit(model, [model.measured[0][1:]])
     with pytest.raises(ValueError, match="at least one free number"):
-        fit(VehicleModel(CAR, [], [BUMP]), model.measured)
+        fit(DriveModel(CAR, [], [BUMP]), model.measured)
 
 
 def test_records_of_nothing_but_zeros() -> None:
-    model = VehicleModel(CAR, [free(CAR, MASS)], [BUMP])
+    model = DriveModel(CAR, [free(CAR, MASS)], [BUMP])
     with pytest.raises(ValueError, match="expected measurements that vary, found nothing but 0"):
         fit(model, [np.zeros_like(model.measured[0])])
 
 
 def test_another_record_than_this_one_is_not_explained() -> None:
-    model = VehicleModel(CAR, [free(CAR, MASS)], [road_record(CAR, 10.0, 14.0, 1)])
+    model = DriveModel(CAR, [free(CAR, MASS)], [road_record(CAR, 10.0, 14.0, 1)])
     other = road_record(CAR, 10.0, 14.0, 2).kept_mps2
     with pytest.raises(NotIdentifiable, match="explains nothing of what was measured") as refused:
         fit(model, [other])
@@ -181,6 +181,6 @@ def test_all_starts_have_one_end() -> None:
     records = [bump_record(CAR, 8.0, seed=seed, height_m=height_m, start_m=12.0)
                for seed, height_m in enumerate((0.15, 0.10))]
     wanted = [free(CAR, MASS), free(CAR, "both.suspension_damping_n_s_per_m")]
-    model = VehicleModel(CAR, wanted, records)
+    model = DriveModel(CAR, wanted, records)
     found = fit(model, model.measured, FitOptions(low_pass_hz=20.0, starts=spread_starts(wanted, 4)))
     assert np.abs(found.ends / [875, 1776] - 1).max() < 0.01

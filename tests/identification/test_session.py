@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.identification.drive_model import VehicleModel
+from logger.identification.drive_model import DriveModel
 from logger.identification.identifiability import NotIdentifiable
 from logger.identification.session import (
     UnusableRun,
@@ -42,11 +42,11 @@ def record(mass_kg: float = 875.0, rate_hz: float = 100.0, seconds: float = 8.0)
     return Run("run", rate_hz, accel + noise, 15.0 * time_s, np.full(len(time_s), 15.0), ROAD)
 
 
-def model_of(records: list[Run]) -> VehicleModel:
-    return VehicleModel(CAR, [free(CAR, "sprung_mass_kg")], records)
+def model_of(records: list[Run]) -> DriveModel:
+    return DriveModel(CAR, [free(CAR, "sprung_mass_kg")], records)
 
 
-def options(model: VehicleModel):  # type: ignore[no-untyped-def]
+def options(model: DriveModel):  # type: ignore[no-untyped-def]
     return fit_options(model, "white", None, 0)
 
 
@@ -66,7 +66,7 @@ def test_a_record_upside_down_is_refused() -> None:
 def test_records_that_cannot_be_meant_are_named_by_their_number() -> None:
     good = record()
     check_records([good])
-    for wrong, complaint in ((np.zeros_like(good.measured_mps2), "expected an acceleration that moves"),
+    for wrong, complaint in ((np.zeros_like(good.measured_mps2), "expected an acceleration that varies"),
                              (good.measured_mps2 + 9.8, "expected gravity removed")):
         with pytest.raises(UnusableRun, match=complaint) as raised:
             check_records([good, replace(good, measured_mps2=wrong)])

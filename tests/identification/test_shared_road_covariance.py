@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from logger.api.identify.answer import common_words
-from logger.identification.drive_model import VehicleModel
+from logger.identification.drive_model import DriveModel
 from logger.identification.noise_models import RoadNoise
 from logger.identification.prediction_error_fit import FitOptions, fit
 from logger.identification.shared_road_covariance import CommonRoughness, may_have_common, with_common_roughness
@@ -33,13 +33,13 @@ def drive_over(speed_mps: float, road_seed: int, seed: int, off_m: float) -> Run
     return Run("run", 100.0, readings, way_m + off_m, np.full(len(time_s), speed_mps), FLAT)
 
 
-def fitted(speeds_mps: tuple[float, ...], roads: tuple[int, ...]) -> tuple[VehicleModel, CommonRoughness, float]:
+def fitted(speeds_mps: tuple[float, ...], roads: tuple[int, ...]) -> tuple[DriveModel, CommonRoughness, float]:
     """What the drives have in common, and the standard error of the mass without that."""
     records = [drive_over(speed, road, 10 * road + number, 0.6 * number)
                for number, (speed, road) in enumerate(zip(speeds_mps, roads, strict=True))]
     road = RoadInput(bump=Bump(20.5, 0.08, 3.6))
     numbers = [free(CAR, MASS)] + [free_input(road, one) for one in expanded("each.bump.start_m", len(records))]
-    model = VehicleModel(CAR, numbers, records, road)
+    model = DriveModel(CAR, numbers, records, road)
     found = fit(model, model.measured, FitOptions(noise=[RoadNoise(model.road_spectra)]))
     return model, with_common_roughness(model, found), found.standard_errors[MASS]
 

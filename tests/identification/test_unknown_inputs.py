@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from logger.identification.drive_model import VehicleModel
+from logger.identification.drive_model import DriveModel
 from logger.identification.identifiability import WEAK, NotIdentifiable
 from logger.identification.noise_models import White
 from logger.identification.prediction_error_fit import Fit, FitOptions, fit
@@ -61,10 +61,10 @@ def step_record(car: Vehicle, height_m: float, speed_mps: float = 13.4, track: T
     return Run("run", 100.0, measured, way, np.full(600, speed_mps), track or FLAT, 0.0)
 
 
-def model(car: Vehicle, records: list[Run], road: RoadInput, *names: str, **start: float) -> VehicleModel:
+def model(car: Vehicle, records: list[Run], road: RoadInput, *names: str, **start: float) -> DriveModel:
     numbers = [free_input(road, name, start.get(name)) if is_input(name) else free(car, name, start.get(name))
                for name in names]
-    return VehicleModel(car, numbers, records, road)
+    return DriveModel(car, numbers, records, road)
 
 
 def found(car: Vehicle, records: list[Run], road: RoadInput, *names: str, **start: float) -> Fit:

@@ -32,7 +32,6 @@ from logger.identification.session import (
     LEAST_SAMPLES,
     UnusableRun,
     check_records,
-    drive_model,
     drives_of,
     error_before,
     fit_options,
@@ -348,7 +347,7 @@ def _drive_model(given: vehicle_file.CarModel, records: list[Record], road: Road
         raise question.wrong("obstacles", f" {obstacle}:{words}") from None
     parameters = _free(given, road, starts, len(records), question, known)
     try:
-        return drive_model(given.vehicle, given.effects, parameters, records, road)
+        return DriveModel(given.vehicle, parameters, records, road, given.effects)
     except ValueError as error:
         raise question.wrong("free", f": {error}") from None
 

@@ -38,7 +38,6 @@ from logger.vehicle.named_parameters import WEAKEST, Coordinates
 _WAVINESS = (1.0, 3.5)  # of the flattest and the steepest road there is
 # How long a step may be; how many standard errors from the end the end is reached.
 _LONGEST_STEP, _CLOSE, _MOST_STEPS = 0.3, 0.02, 30
-_NOTHING = 1e-4
 _OFFSET_WEAKEST_M, _SCALE_WEAKEST = 0.5, 1.0
 # Drives over one road leave no more together than each alone, but for so many times, and this share of the readings.
 _MORE_TOGETHER, _LITTLE = 1.5, 0.05
@@ -122,7 +121,7 @@ class RoadProblem:
         """What no such drives could determine, of the car and of all else that is not known."""
         powers, directions = np.linalg.eigh(information)
         derivatives = np.sqrt(np.maximum(powers, 0.0))[:, None] * directions.T
-        return structural(self.names, derivatives, 1.0, _NOTHING)
+        return structural(self.names, derivatives, 1.0)
 
     def result(self, climbed: Maximum[RoadsScore], before: float, findings: list[Finding]) -> RoadFit:
         """The fit that ended there, in plain units. NotIdentifiable where the drives cannot identify the numbers."""

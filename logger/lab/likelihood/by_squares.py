@@ -14,6 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from logger.arrays import Array
+from logger.lab.likelihood.distance_error import ErrorSize
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import CONVERGED, optimise_numbers
 from logger.lab.likelihood.posterior import NotSimulated, Posterior, State
@@ -62,27 +63,28 @@ class BySquares:
     def at(self, effects: Sequence[Chosen], logs: Array, near: State) -> tuple[float, State] | None:
         """The state with these numbers and the records' errors of another state, of these runs or of all, and its
         deviance; None where it cannot be."""
-        record = near.record if len(near.record) == len(self.kept) else [near.record[one] for one in self.kept]
-        try:
-            with np.errstate(all="ignore"):
-                state = self.posterior.state_at(effects, logs, record, near.size)
-                deviance = self.deviance(state)
-        except NotSimulated:
-            return None
-        return (deviance, state) if np.isfinite(deviance) else None
+        return self._at(effects, logs, self._kept_of(near.record), near.size)
 
     def rank(self, effects: Sequence[Chosen], logs: Array, near: State) -> float:
         """The deviance of a car by the loudest run alone, simulated roughly: enough to tell which of many cars are
         near. Arguments as of ``at``; infinite where it cannot be."""
-        posterior, index = self._loudest.posterior, self._loudest.kept[0]
-        record = near.record[index if len(near.record) == len(self.whole.runs) else self.kept.index(index)]
+        record = self._kept_of(near.record)[self.kept.index(self._loudest.kept[0])]
+        found = self._loudest._at(effects, logs, [record], near.size, rough=True)
+        return np.inf if found is None else found[0]
+
+    def _kept_of(self, record: Sequence[Array]) -> list[Array]:
+        return list(record) if len(record) == len(self.kept) else [record[one] for one in self.kept]
+
+    def _at(self, effects: Sequence[Chosen], logs: Array, record: list[Array], size: ErrorSize, rough: bool = False
+            ) -> tuple[float, State] | None:
         try:
             with np.errstate(all="ignore"):
-                predictions = posterior.predict(effects, logs, [record], rough=True)
-                found = self._loudest.deviance(State(tuple(effects), logs, [record], near.size, predictions))
+                predictions = self.posterior.predict(effects, logs, record, rough=rough)
+                state = State(tuple(effects), logs, record, size, predictions)
+                deviance = self.deviance(state)
         except NotSimulated:
-            return np.inf
-        return found if np.isfinite(found) else np.inf
+            return None
+        return (deviance, state) if np.isfinite(deviance) else None
 
     @cached_property
     def _loudest(self) -> BySquares:

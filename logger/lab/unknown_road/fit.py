@@ -1,5 +1,4 @@
-"""Fits of a model to drives over an unknown road, by Fisher scoring, and score tests of effects on top of one.
-"""
+"""Fits of a model to drives over an unknown road, by Fisher scoring, and score tests of effects on top of one."""
 
 from __future__ import annotations
 
@@ -12,6 +11,7 @@ from logger.arrays import Array, Complex
 from logger.fitting.fisher_scoring import maximise
 from logger.fitting.information_matrix import inverse
 from logger.identification.unknown_road.marginal_likelihood import RoadsScore
+from logger.lab.likelihood.map_fit import ends_of
 from logger.lab.selection.screening import scale_strength
 from logger.lab.unknown_road.likelihood import PROBES, RoadFitState, SameRoad
 from logger.vehicle.effect import Chosen, Scale
@@ -83,17 +83,11 @@ def response_and_slopes(problem: SameRoad, effects: tuple[Chosen, ...], free_par
                         logs: Array, step: float = 1e-3) -> tuple[Complex, Complex]:
     """A response (d, x, f) and its derivatives (p + q, d, x, f) by the logs and the free parameters, over steps of this
     share."""
-    gains = problem.response(effects, logs)
-    slopes = []
-    for index in range(len(logs)):
-        shifted = logs.copy()
-        shifted[index] += step
-        slopes.append((problem.response(effects, shifted) - gains) / step)
-    here = coordinates_of(effects, free_parameters)
-    for index, own_step in enumerate(steps_of(effects, free_parameters, step, step)):
-        shifted = here.copy()
-        shifted[index] += own_step
-        slopes.append((problem.response(with_coordinates(effects, free_parameters, shifted), logs) - gains) / own_step)
+    gains, p = problem.response(effects, logs), len(logs)
+    here = np.concatenate([logs, coordinates_of(effects, free_parameters)])
+    steps = np.concatenate([np.full(p, step), steps_of(effects, free_parameters, step, step)])
+    slopes = [(problem.response(with_coordinates(effects, free_parameters, there[p:]), there[:p]) - gains) / one
+              for there, one in zip(here + np.diag(steps), steps, strict=True)]
     return gains, np.array(slopes).reshape(len(slopes), *gains.shape)
 
 
@@ -103,7 +97,7 @@ def _limits(effects: Sequence[Chosen], free_parameters: Sequence[FreeParameter],
     low, high, longest = np.full(count, -np.inf), np.full(count, np.inf), np.full(count, longest_log)
     for index, free in enumerate(free_parameters, first):
         parameter = effects[free.effect].effect.parameters[free.parameter]
-        low[index], high[index] = sorted(parameter.coordinate(one) for one in (parameter.low, parameter.high))
+        low[index], high[index] = ends_of(parameter)
         if parameter.scale is not Scale.LOG:
             longest[index] = max(parameter.usual_range(), 0.5 * abs(coordinates_of(effects, [free])[0]))
     return low, high, longest

@@ -1,4 +1,4 @@
-"""Cars with effects: against the exact model where the car is linear, and against Newton's laws where it rubs."""
+"""Cars with effects: against the car without where they do nothing, and against Newton's laws where it rubs."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from logger.identification.drive_model import SimulatedModel, VehicleModel
+from logger.identification.drive_model import DriveModel
 from logger.identification.identifiability import TOGETHER, NotIdentifiable
 from logger.identification.noise_models import White
 from logger.identification.prediction_error_fit import Fit, FitOptions, fit
@@ -42,7 +42,7 @@ def rubbing(friction_n: float) -> Chosen:
 
 
 def model(records: list[Run], effects: list[Chosen], starts: dict[str, float], road: RoadInput | None = None
-          ) -> SimulatedModel:
+          ) -> DriveModel:
     road = road or RoadInput()
     numbers = []
     for name, start in starts.items():
@@ -51,7 +51,7 @@ def model(records: list[Run], effects: list[Chosen], starts: dict[str, float], r
             numbers.append(free_input(road, name, start))
         else:
             numbers.append(free(CAR, name, start) if move is None else free_number(effects, move, start))
-    return SimulatedModel(CAR, numbers, records, road, effects)
+    return DriveModel(CAR, numbers, records, road, effects)
 
 
 def found(*asked: object) -> Fit:
@@ -71,12 +71,12 @@ def recorded(run: Run, effects: list[Chosen], noise_mps2: float = 0.05, seed: in
     return replace(run, measured_mps2=clean + noise_mps2 * np.random.default_rng(seed).standard_normal(run.count))
 
 
-def test_a_linear_car_does_as_the_exact_model_says() -> None:
+def test_a_load_of_nothing_changes_nothing() -> None:
     record = road_record(CAR, 12.0, 14.0, 3)
     starts = {name: free(CAR, name).start for name in
               (MASS, "front.suspension_damping_n_s_per_m", "rear.tire_stiffness_n_per_m", "contact_patch_m")}
     simulated = model([record], [effect("payload", mass_kg=0.0)], starts)
-    exact = VehicleModel(CAR, simulated.parameters, [record])
+    exact = DriveModel(CAR, simulated.parameters, [record])
     values = np.array(list(starts.values()))
     (here, slopes), (expected, expected_slopes) = simulated.linearised(values), exact.linearised(values)
     assert np.std(here[0] - expected[0]) < 1e-5 * np.std(expected[0])

@@ -1,4 +1,4 @@
-"""Predictions a frequency at a time against the stepping simulation, and their derivatives against differences."""
+"""Predictions against the stepping simulation, and their derivatives against differences."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from logger.identification.drive_model import VehicleModel
+from logger.identification.drive_model import DriveModel
 from logger.identification.prediction_error_fit import fit
 from logger.profiles.track import Track
 from logger.runs import CLIPPED, NO_READING, READING, Run
@@ -30,7 +30,7 @@ def rms(values: Array) -> float:
     return float(np.sqrt(np.mean(values**2)))
 
 
-def values_of(model: VehicleModel) -> Array:
+def values_of(model: DriveModel) -> Array:
     return np.array([one.start for one in model.parameters])
 
 
@@ -39,7 +39,7 @@ def values_of(model: VehicleModel) -> Array:
 def test_it_is_what_stepping_gives(car: Vehicle, kind: str) -> None:
     record = (bump_record(car, noise_mps2=0.0) if kind == "bump"
               else road_record(car, 30.0, 18.0, 3, noise_mps2=0.0, swing_mps=3.0))
-    model = VehicleModel(car, [], [record])
+    model = DriveModel(car, [], [record])
     assert rms(model.predict(np.empty(0))[0] - model.measured[0]) < 2e-5 * rms(model.measured[0])
 
 
@@ -48,7 +48,7 @@ def test_a_car_with_little_damping_on_a_road_that_climbs() -> None:
     distance = np.arange(2000) * 0.12
     track = Track(0.05, 0.05 * np.arange(6000) * 0.05 + 0.01 * np.sin(np.arange(6000) * 0.05))
     measured = recorded(car, track, distance, 0.0, 0)
-    model = VehicleModel(car, [], [Run("run", 100.0, measured, distance, np.full(2000, 12.0), track)])
+    model = DriveModel(car, [], [Run("run", 100.0, measured, distance, np.full(2000, 12.0), track)])
     assert rms(model.predict(np.empty(0))[0] - model.measured[0]) < 1e-4 * rms(model.measured[0])
 
 
@@ -59,9 +59,9 @@ def test_two_tracks_and_another_rate() -> None:
     distance = 2 + 14 * np.arange(200) / 100
     measured = recorded(car, track, distance, 0.0, 0)
     record = Run("run", 100.0, measured, distance, np.full(200, 14.0), track, skip_s=0.0)
-    assert rms(VehicleModel(car, [], [record]).predict(np.empty(0))[0] - measured) < 1e-4 * rms(measured)
+    assert rms(DriveModel(car, [], [record]).predict(np.empty(0))[0] - measured) < 1e-4 * rms(measured)
     half_rate = Run("half", 50.0, measured[::2], distance[::2], record.speed_mps[::2], track, skip_s=0.0)
-    slow = VehicleModel(car, [], [half_rate]).predict(np.empty(0))[0]
+    slow = DriveModel(car, [], [half_rate]).predict(np.empty(0))[0]
     spectrum, slow_spectrum = (np.fft.rfft(one * np.hanning(len(one)))[2:30] for one in (measured, slow))
     assert np.abs(slow_spectrum * 2 - spectrum).max() < 0.02 * np.abs(spectrum).max()
 
@@ -70,7 +70,7 @@ def test_two_tracks_and_another_rate() -> None:
 def test_derivatives_are_those_of_the_prediction(car: Vehicle) -> None:
     record = road_record(car, 12.0, 15.0, 5)
     single = [name for name in names(car) if "anti_roll" not in name and "both" not in name]
-    model = VehicleModel(car, [free(car, name) for name in single], [record])
+    model = DriveModel(car, [free(car, name) for name in single], [record])
     values = values_of(model)
     predictions, slopes = model.linearised(values)
     assert predictions[0] == pytest.approx(model.predict(values)[0], abs=1e-9)
@@ -83,7 +83,7 @@ def test_derivatives_are_those_of_the_prediction(car: Vehicle) -> None:
 
 def test_a_road_has_the_spectrum_that_the_car_gives_it() -> None:
     record = road_record(HALF, 300.0, 15.0, 8, gd_n0_cm3=64.0, noise_mps2=0.0, swing_mps=0.0)
-    model = VehicleModel(HALF, [], [record])
+    model = DriveModel(HALF, [], [record])
     segments = model.measured[0][: 512 * 58].reshape(58, 512) * np.hanning(512)
     welch = (np.abs(np.fft.rfft(segments)) ** 2).mean(axis=0) * 2 / (100 * (np.hanning(512) ** 2).sum())
     f_hz = np.arange(257) * 100 / 512
@@ -100,9 +100,9 @@ def test_records_that_are_none() -> None:
     with pytest.raises(ValueError, match="longer than 6 s"):
         replace(record, skip_s=6.0)
     with pytest.raises(ValueError, match=r"found rear\.unsprung_mass_kg twice"):
-        VehicleModel(HALF, [free(HALF, f"{part}.unsprung_mass_kg") for part in ("rear", "both")], [record])
+        DriveModel(HALF, [free(HALF, f"{part}.unsprung_mass_kg") for part in ("rear", "both")], [record])
     with pytest.raises(ValueError, match="no parameter"):
-        VehicleModel(HALF, [replace(free(HALF, "sprung_mass_kg"), name="mass")], [record])
+        DriveModel(HALF, [replace(free(HALF, "sprung_mass_kg"), name="mass")], [record])
 
 
 def gapped(seed: int, clipped_mps2: float = np.inf) -> Run:
@@ -119,7 +119,7 @@ def gapped(seed: int, clipped_mps2: float = np.inf) -> Run:
 def test_what_stands_in_gaps_does_not_change_a_fit() -> None:
     found = []
     for seed in (1, 2):
-        model = VehicleModel(HALF, [free(HALF, "sprung_mass_kg")], [gapped(seed)])
+        model = DriveModel(HALF, [free(HALF, "sprung_mass_kg")], [gapped(seed)])
         found.append(fit(model, model.measured).parameters["sprung_mass_kg"])
     assert found[0] == pytest.approx(found[1], rel=1e-6)
     assert found[0] == pytest.approx(HALF.sprung_mass_kg, rel=0.01)
@@ -128,8 +128,8 @@ def test_what_stands_in_gaps_does_not_change_a_fit() -> None:
 def test_a_clipped_drive_is_fitted_as_one_that_is_not() -> None:
     record = gapped(1, clipped_mps2=0.8)
     assert record.usable is not None and (record.usable == CLIPPED).sum() > 50
-    model = VehicleModel(changed(HALF, {"sprung_mass_kg": 950.0}), [free(HALF, "sprung_mass_kg")], [record])
+    model = DriveModel(changed(HALF, {"sprung_mass_kg": 950.0}), [free(HALF, "sprung_mass_kg")], [record])
     assert fit(model, model.measured).parameters["sprung_mass_kg"] == pytest.approx(HALF.sprung_mass_kg, rel=0.003)
-    as_read = VehicleModel(HALF, [free(HALF, "sprung_mass_kg")], [replace(record, usable=np.where(
+    as_read = DriveModel(HALF, [free(HALF, "sprung_mass_kg")], [replace(record, usable=np.where(
         record.usable == CLIPPED, READING, record.usable))])
     assert abs(fit(as_read, as_read.measured).parameters["sprung_mass_kg"] / HALF.sprung_mass_kg - 1) > 0.01
