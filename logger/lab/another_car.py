@@ -12,7 +12,7 @@ were refitted to such a record are no car's any more).
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
@@ -113,10 +113,7 @@ def reading_gain(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen
 
 def _first_part(run: Run) -> Run:
     """The first 25 s of a run: some thirty bounces of the body are enough to recognise a car by."""
-    count = min(run.count, round((run.skip_s + 25.0) * run.rate_hz))
-    return replace(run, measured_mps2=run.measured_mps2[:count], distance_m=run.distance_m[:count],
-                   speed_mps=run.speed_mps[:count], usable=None if run.usable is None else run.usable[:count],
-                   more=run.more[:, :count])
+    return run.part(slice(round((run.skip_s + 25.0) * run.rate_hz)))
 
 
 def _cross_entropy_search(wide: Posterior, effects: Sequence[Chosen], error_of: Callable[[list[Array]], float]

@@ -136,9 +136,7 @@ def without_profile(record: Run, speed_scale: float = 1.0) -> Run:
 
 def until(record: Run, distance_m: float) -> Run:
     """The part of a record up to where the front tires are at a place."""
-    kept = slice(int(np.searchsorted(record.distance_m, distance_m)))
-    return replace(record, measured_mps2=record.measured_mps2[kept],
-                   distance_m=record.distance_m[kept], speed_mps=record.speed_mps[kept])
+    return record.part(slice(int(np.searchsorted(record.distance_m, distance_m))))
 
 
 def _recorded(vehicle: Vehicle | None, track: Track, distance_m: Array, conditions: Conditions) -> Array:

@@ -412,5 +412,4 @@ def _cut(runs: Sequence[Run], least_s: float, stretch_s: float = 10.0) -> list[l
 def _joined(run: Run, parts: Sequence[Array]) -> Run:
     """Residuals of parts of a run, as a run."""
     residual = np.concatenate([np.zeros(run.first), *parts])
-    own = slice(len(residual))
-    return replace(run, measured_mps2=residual, distance_m=run.distance_m[own], speed_mps=run.speed_mps[own])
+    return replace(run.part(slice(len(residual))), measured_mps2=residual)
