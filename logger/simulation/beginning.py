@@ -75,7 +75,7 @@ def _linear_beginning(car: Car, passage: Passage, weighed: _WeighedRecord, count
     # What nothing drives is still, and each signal counts without its mean.
     still = np.zeros_like(wanted) if weighed.run.past is Past.FREE else weighed.of(plain, passage)
     # Small, as records are clipped at what no sensor reads: 1 m is that of what is let go at 160 Hz.
-    small = passage.begun_in_each(_SMALL_STATE * np.eye(moves))
+    small = map(passage.begun_with, _SMALL_STATE * np.eye(moves))
     columns[:, :moves] = np.stack([weighed.of(plain, one) - still for one in small], axis=1) / _SMALL_STATE
     seen = np.linalg.norm(columns[:, :moves], axis=0)
     usual[:moves] = np.divide(np.linalg.norm(wanted), seen, out=np.zeros_like(seen), where=seen > 0)

@@ -177,20 +177,25 @@ class SimulatedRuns:
 
         return list(map(recorded_road, self._unbegun(car, distance_error_m, False, tracks)))
 
-    def beginnings(self, car: Car, distance_error_m: Sequence[Array] | None = None, rough: bool = False
-                   ) -> list[Beginning | None]:
-        """How the runs begin with this car whose initial state nobody knows; None of the others."""
+    def beginnings(self, car: Car, distance_error_m: Sequence[Array] | None = None) -> list[Beginning | None]:
+        """How the runs begin with this car whose initial state nobody knows, simulated roughly; None of the others."""
         with np.errstate(over="ignore", invalid="ignore"):
-            return [beginning(car, passage, run, _recorded) if begins_unknown(car, run) else None
-                    for run, passage in zip(self.runs, self._unbegun(car, distance_error_m, rough), strict=True)]
+            return [passage.beginning_of(car.record_key, partial(beginning, car, passage, run, _recorded))
+                    if begins_unknown(car, run) else None
+                    for run, passage in zip(self.runs, self._unbegun(car, distance_error_m, rough=True), strict=True)]
 
     def _passages_of(self, car: Car, distance_error_m: Sequence[Array] | None, rough: bool = False,
                      tracks: Sequence[WheelTracks] | None = None, near: Sequence[Beginning | None] | None = None
                      ) -> list[Passage]:
         passages = self._unbegun(car, distance_error_m, rough, tracks)
-        return [passage.begun_with(beginning(car, passage, run, _recorded, one).state) if begins_unknown(car, run)
-                else passage
-                for run, passage, one in zip(self.runs, passages, near or [None] * len(passages), strict=True)]
+        if not any(begins_unknown(car, run) for run in self.runs):
+            return passages
+        known = near or self.beginnings(car, distance_error_m)
+        alike = [near is None and one is passage for one, passage in zip(
+            self._unbegun(car, distance_error_m, rough=True), passages, strict=True)]
+        return [passage if not begins_unknown(car, run) else passage.begun_with((
+            one if one is not None and same else beginning(car, passage, run, _recorded, one)).state)
+                for run, passage, one, same in zip(self.runs, passages, known, alike, strict=True)]
 
     def _unbegun(self, car: Car, distance_error_m: Sequence[Array] | None, rough: bool,
                  tracks: Sequence[WheelTracks] | None = None) -> list[Passage]:

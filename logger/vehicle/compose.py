@@ -90,6 +90,11 @@ class Car:
         return sum(len(law.memory) for corner in self.laws for law in corner.motions)
 
     @property
+    def record_key(self) -> Hashable:
+        """Equal for two cars of which alike is recorded on one passage."""
+        return self.body, *map(_key, self.sensors), *map(_key, self.records)
+
+    @property
     def linear(self) -> Car:
         """The car without its laws, which its numbers have as well."""
         return replace(self, laws=(), bends_laws=False, body=(self.body[0], ()))

@@ -6,6 +6,7 @@ from collections.abc import Callable, Hashable
 from copy import copy
 from functools import lru_cache
 from math import ceil
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -65,6 +66,7 @@ _TAIL_S = 2.5
 # What rings in a sensor at the end of a transform has died down so much later, before it comes round to the beginning.
 _REST_S = 1.0
 _KEPT_PLACES, _KEPT_BODIES = 3, 6
+B = TypeVar("B")
 
 
 class Passage:
@@ -119,7 +121,7 @@ class Passage:
         self._recorder = _recorder(self._coarse, self.steps)
         self._known: dict[tuple[Hashable, ...], tuple[Array, Array]] = {}
         self._bodies: dict[Hashable, Complex] = {}
-        self._begun: dict[bytes, list[Passage]] = {}
+        self._beginnings: dict[Hashable, Any] = {}
         self._cuts: dict[int, Passage] = {}
 
     @property
@@ -142,15 +144,16 @@ class Passage:
     def begun_with(self, state: Array) -> Passage:
         """The same passage begun in a state that differs by this (2 n + k,) from the one at rest, as ``begins``."""
         found = copy(self)
-        found.begins, found._bodies, found._begun = state, {}, {}
+        found.begins, found._bodies = state, {}
         return found
 
-    def begun_in_each(self, states: Array) -> list[Passage]:
-        """The passages begun in these states (m, 2 n + k), which keep the bodies that passed; the same ones again."""
-        key = states.tobytes()
-        if (found := self._begun.get(key)) is None:
-            found = self._begun[key] = [self.begun_with(one) for one in states]
-        return found
+    def beginning_of(self, record_key: Hashable, find: Callable[[], B]) -> B:
+        """How it begins with one of the last few cars, by its ``record_key``; found if it has not been yet."""
+        known: B | None = self._beginnings.get(record_key)
+        if known is None:
+            known = find()
+            self._beginnings = dict([*self._beginnings.items()][-_KEPT_BODIES + 1 :]) | {record_key: known}
+        return known
 
     @property
     def way(self) -> Way:

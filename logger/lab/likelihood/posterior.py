@@ -125,7 +125,7 @@ class Posterior:
 
     def beginnings(self, effects: Sequence[Chosen], logs: Array, record: Sequence[Array]) -> list[Beginning | None]:
         """How the runs begin, by a rough simulation, whose initial state nobody knows; None of the others."""
-        return self.runs.beginnings(self.car(effects, logs), self.distance_error_m(record), rough=True)
+        return self.runs.beginnings(self.car(effects, logs), self.distance_error_m(record))
 
     def predictor(self, state: State) -> Predict:
         """A function that predicts models near a state: by rough simulations, corrected by the difference of a fine and
