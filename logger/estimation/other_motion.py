@@ -11,8 +11,6 @@ of which the road is found. A rough road that hides a line has it in itself alre
 
 from __future__ import annotations
 
-from functools import lru_cache
-
 import numpy as np
 
 from logger.arrays import Array, Complex
@@ -97,7 +95,7 @@ class OtherMotion:
         f_hz = np.linspace(0.0, self._rate_hz / 2, len(road_psd))
         looked_at = (f_hz >= _LOWEST_HZ) & (f_hz <= HIGHEST_HZ)
         taper = np.zeros(count)
-        taper[span[0]:span[-1] + 1] = _hann(int(span[-1] - span[0]) + 1)
+        taper[span[0]:span[-1] + 1] = np.hanning(int(span[-1] - span[0]) + 1)
         fresh = np.abs(np.fft.rfft(weight * residual_mps2 * taper)) ** 2 / float(weight @ taper**2)
         before = np.ones(len(fresh)) if self._power is None else self._power
         share = max(1 / (1 / _FIRST_TAKEN_OVER + self._heard), _TAKEN_OVER)
@@ -119,9 +117,3 @@ class OtherMotion:
         self.psd = np.where(bands, np.maximum(total - usual * noise, 0.0), 0.0)
         both = self.psd * noise / (self.psd + noise)
         self.variance_left = float(both.mean()) * self._rate_hz / 2
-
-
-@lru_cache(maxsize=4)
-def _hann(count: int) -> Array:
-    """Hann's window (count,); kept, for most blocks are read over the same length."""
-    return np.asarray(np.hanning(count))

@@ -32,6 +32,7 @@ from logger.estimation.quantisation import (
 from logger.estimation.road_solver import Block, Solution
 from logger.estimation.road_spectrum import COMMON_ROAD, RoadSpectrum, learnt
 from logger.estimation.roughness import RoadLevels, mean_resolved
+from logger.estimation.scored_variances import ScoredVariances
 from logger.estimation.sensor_noise import (
     NoiseBelief,
     NoiseLearner,
@@ -67,6 +68,9 @@ _LEAST_SHARE_OF_STEP = 0.07
 # and 0.07 with none, 1 to 4, 5 to 19, 20 to 99 and more such readings in a block, where these say 0.70, 0.55, 0.22,
 # 0.11 and 0.02.
 _LIKE_NOISE, _HALVED_BY = 0.7, 6.0
+# Of each cosine of the drift, and by how much the logarithm differs from drive to drive: roads are even or hilly, and a
+# sensor that leans feels the brakes. A minute of a measured drive (comma2k19, 8 to 20 m/s) has 0.05 to 0.10 m/s2 r.m.s.
+_COMMON_DRIFT, _DRIFT_LOG_STD = np.array([0.05**2]), 2.4
 _MEDIAN_COST = pi / 2  # variance of a median over that of a mean
 
 
@@ -109,6 +113,7 @@ class FollowedRoad:
         self._sensor = sensor
         self._spacing_m = spacing_m
         self._other = OtherMotion()
+        self._drift = ScoredVariances(_COMMON_DRIFT, _DRIFT_LOG_STD)
         self._spectrum, self._log_noise = COMMON_ROAD, 0.0  # of the variance, over the sensor's
         self._learner: NoiseLearner | None = None
         if noise is not None:
@@ -296,19 +301,20 @@ class FollowedRoad:
             variance = variance + beside_road
         weight = np.where(each, 1 / variance, 0.0)
         seen_share = block.seen_points(read) / block.count
+        drift_variance = float(self._drift.values[0])
         start = None if self._solved_last is None else block.carried_over(*self._solved_last)
-        solution = block.solve(readings.value_mps2 - self._other.motion_mps2, weight, spectrum, local, steps, start)
+        solution = block.solve(readings.value_mps2 - self._other.motion_mps2, weight, spectrum, local,
+                               drift_variance, steps, start)
 
         moving = np.repeat(block.moving, reads) & each
         mean_variance = 1 / float(weight[moving].mean()) if moving.any() else float(variance.mean())
-        gain, ratio, free = solution.gain, np.ones(block.count), None
+        gain, ratio, free, even_share = solution.gain, np.ones(block.count), None, 1.0
         if self._is_coarse:
             motion = steady_motion(block.car, block.mean_speed_mps, self._spectrum, RATE_HZ, len(samples), reads)
             solution = self._with_other_motion(solution, readings, weight, motion, learns and is_last)
             motion = self._other.beside(motion)
             relative = np.repeat(block.felt(local), reads)  # motion as strong as where it was felt
             others, even = (relative * row for row in cavity(motion, variance / relative))
-            drift_variance = solution.drift_variance
             self._centre_mps2 = float(solution.drift_mps2[-1])
             self._accel_variance = motion.variance * float(relative[-1])
             if moving.any():
@@ -316,7 +322,7 @@ class FollowedRoad:
                 shown = np.maximum(block.about(moving.astype(np.float64)), _LEAST_SHOWN)
                 ratio = block.about(np.where(moving, mean_variance / even, 0.0)) / shown
                 ratio = np.where(shown > _LEAST_SHOWN, np.maximum(ratio, _LEAST_SHOWN), 1.0)
-                drift_variance = solution.drift_variance / float(ratio[seen > 0].mean())
+                even_share = float(ratio[seen > 0].mean())
                 free = float((weight / (1 / others + weight))[moving].sum())
                 free *= 1 / (1 + block.car.behind_m.max() / self._spacing_m / float(seen.sum()))
                 taken_off = between(beyond_mps2, reads) if isinstance(beyond_mps2, np.ndarray) else beyond_mps2
@@ -324,6 +330,9 @@ class FollowedRoad:
                 beyond = _beyond_two(as_read[moving], self._step_mps2) / reads
                 self._like_noise = _LIKE_NOISE * _HALVED_BY / (_HALVED_BY + beyond)
 
+        left, slope, curvature = block.grid.drift_evidence(solution, drift_variance, even_share)
+        if learns and is_last:
+            self._drift.learn(np.array([slope]), np.array([curvature]))
         now = spectrum
         if learns or before is None:
             resolved = mean_resolved(gain, (local * ratio)[seen > 0])
@@ -342,7 +351,7 @@ class FollowedRoad:
         self._solved_last = block, block.same_road(solution.waves, spectrum, self._spectrum)
         if self._is_coarse:
             usable = moving if learns and self._learner is not None else None
-            improved_ones = self._improved(readings, samples, each, solution, others + drift_variance, usable)
+            improved_ones = self._improved(readings, samples, each, solution, others + left, usable)
             if moving.any():
                 change = np.log(improved_ones.variance[moving] / readings.variance[moving])
                 self._bounds_moved = float(np.sqrt(np.mean(change**2)))

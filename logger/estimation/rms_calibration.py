@@ -260,10 +260,8 @@ class RmsRelation:
     def iri(self, accel_rms_mps2: Array, speed_mps: Array | float) -> Array: ...
     def iri(self, accel_rms_mps2: float | Array, speed_mps: float | Array) -> float | Array:
         """IRI [m/km] of a road that shakes the car this much [m/s2] at this speed; NaN outside the table's speeds."""
-        return accel_rms_mps2 * self._ratio(speed_mps)
-
-    def _ratio(self, speed_mps: float | Array) -> Array:
-        return np.asarray(np.interp(speed_mps, self.speeds_mps, self.iri_per_accel_rms, left=np.nan, right=np.nan))
+        ratio = np.interp(speed_mps, self.speeds_mps, self.iri_per_accel_rms, left=np.nan, right=np.nan)
+        return accel_rms_mps2 * np.asarray(ratio)
 
 
 def rms_relation(

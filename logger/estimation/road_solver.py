@@ -11,7 +11,7 @@ readings (one over their variance, 0 where there is none). A is quick to apply: 
 elevations to those under each axle by interpolation, and from there to the reading by an FFT in time; its transpose
 likewise. At constant speed and with D = 1 the matrix is nearly diagonal in the waves of v, which is the Wiener filter,
 and makes a preconditioner with which a few steps of conjugate gradients are enough. Slow drift (gravity, tilt, braking,
-temperature) is a few cosines of broad variance, eliminated exactly.
+temperature) is a constant and a few cosines, eliminated exactly.
 
 Both grids are periodic. In space the road goes on unseen for longer than it remembers; in time the first
 ``ENTRY_S`` are where the car's memory of what came before dies, and their readings must have no weight.
@@ -38,7 +38,6 @@ _MARGIN_M = 5.0
 _FAST_SHARE = 0.98
 _SPEED_CLASSES_PER_E = 10
 _DRIFT_BELOW_HZ = 0.1
-_DRIFT_MPS2 = 0.05
 _WORTH_A_STEP = 5.0  # of log probability; a lone bump on a smooth road needs more steps than roads do
 _MOST_TIMES = 4
 _LOG_WAVE_NUMBERS = np.log(WAVE_NUMBERS_CPM)
@@ -51,7 +50,8 @@ class Solution:
     innovations  (n,) v itself, point by point
     fitted_mps2  (y,) the readings that this road and the drift explain
     drift_mps2   (y,) the drift alone
-    drift_variance    (y,) that the readings leave of it, were the road known [(m/s2)2]
+    drift        (d,) amplitudes of its constant and cosines [m/s2]
+    drift_information    (d, d) of the readings about them, were the road known [(m/s2)-2]
     gain         (k,) information over prior of each wave where D is 1; the readings resolve g / (1 + g) of its variance
     """
 
@@ -60,7 +60,8 @@ class Solution:
     innovations: Array
     fitted_mps2: Array
     drift_mps2: Array
-    drift_variance: Array
+    drift: Array
+    drift_information: Array
     gain: Array
 
 
@@ -78,8 +79,20 @@ class TimeGrid:
         power = np.fft.irfft(1j * in_a_step) ** 2
         self.step_power = np.fft.rfft(power / power.sum(axis=1, keepdims=True))
         self.drift = _drift(count * reads, int(2 * _DRIFT_BELOW_HZ * count / rate_hz))
-        # The constant is gravity: nothing is known of it. The rest is small.
-        self.drift_precision = np.array([1e-6, *np.full(len(self.drift) - 1, _DRIFT_MPS2**-2)])
+
+    def drift_precision(self, variance: float) -> Array:
+        """Of the constant, which is gravity and of which nothing is known, and of the cosines (1 + half_waves,) of so
+        much variance each [(m/s2)-2]."""
+        return np.array([1e-6, *np.full(len(self.drift) - 1, 1 / variance)])
+
+    def drift_evidence(self, solution: Solution, variance: float, share: float) -> tuple[Array, float, float]:
+        """Variance (y,) that the readings leave of the drift [(m/s2)2], and slope and expected curvature of their log
+        evidence in the logarithm of the ``variance`` of its cosines (MacKay 1992), where the road, which is not known
+        either, leaves a ``share`` of what they say of it."""
+        left = np.linalg.inv(share * solution.drift_information + np.diag(self.drift_precision(variance)))
+        told = 1 - np.diag(left)[1:] / variance
+        slope = 0.5 * float(np.sum(solution.drift[1:] ** 2 / variance - told))
+        return np.einsum("ij,ij->j", left @ self.drift, self.drift), slope, 0.5 * float(told @ told)
 
 
 @lru_cache(maxsize=2)
@@ -103,7 +116,7 @@ class Block:
 
     def __init__(self, grid: TimeGrid, distance_m: Array, spacing_m: float, align_m: float) -> None:
         car, rate_hz = grid.car, grid.rate_hz
-        self._grid = grid
+        self.grid = grid
         self.car = car
         self.spacing_m = spacing_m
         first_m = distance_m[0] - car.behind_m.max() - _MARGIN_M
@@ -129,7 +142,7 @@ class Block:
     def on(self, grid: TimeGrid) -> Block:
         """The same stretch, driven by a car whose axles stand as this one's do and that answers otherwise."""
         other = copy(self)
-        other._grid, other.car = grid, grid.car
+        other.grid, other.car = grid, grid.car
         return other
 
     def solve(
@@ -138,6 +151,7 @@ class Block:
         weight: Array,
         spectrum: RoadSpectrum,
         relative_variance: Array,
+        drift_variance: float,
         steps: int,
         start: Complex | None = None,
     ) -> Solution:
@@ -146,14 +160,16 @@ class Block:
         reading_mps2    (y,) readings
         weight          (y,) one over the variance of each, 0 where there is none [(m/s2)-2]
         relative_variance    (count,) of the road at each point, about 1
+        drift_variance    of each cosine of the drift [(m/s2)2]
         steps           of conjugate gradients (Hestenes and Stiefel), from ``start`` or from a flat road
         start           ``waves`` of an earlier solution of this block to go on from, or ``carried_over`` ones
         """
         factor = self.wave_factors(spectrum)
         shaped = factor * self._averaged
         gain = self._gain(weight) * np.abs(factor) ** 2
-        weighted = self._grid.drift * weight
-        inner = np.linalg.inv(self._grid.drift @ weighted.T + np.diag(self._grid.drift_precision))
+        weighted = self.grid.drift * weight
+        information = weighted @ self.grid.drift.T
+        inner = np.linalg.inv(information + np.diag(self.grid.drift_precision(drift_variance)))
         pair = np.empty((2, len(factor)), np.complex128)
 
         def weigh(row: Array) -> Array:
@@ -205,9 +221,9 @@ class Block:
                 pull, held = brought_back(weighed, unlikely)
                 residual = residual - step * (pull + held)
             before = size
-        drift = (inner @ (weighted @ (reading_mps2 - explained))) @ self._grid.drift
-        drift_variance = np.einsum("ij,ij->j", inner @ self._grid.drift, self._grid.drift)
-        return Solution(waves, waves * factor, white, explained + drift, drift, drift_variance, gain)
+        amplitudes = inner @ (weighted @ (reading_mps2 - explained))
+        drift = amplitudes @ self.grid.drift
+        return Solution(waves, waves * factor, white, explained + drift, drift, amplitudes, information, gain)
 
     def carried_over(self, earlier: Block, waves: Complex) -> Complex:
         """``waves`` of an earlier block on the same spacing as they lie in this one; road that is new is still flat.
@@ -244,7 +260,7 @@ class Block:
         slowest = self._speed_class.min()
         by_class = np.bincount(self._speed_class[moving] - slowest, weight[moving])
         found = np.flatnonzero(by_class)
-        total = by_class[found] @ self._grid.car.powers(np.exp((slowest + found) / _SPEED_CLASSES_PER_E).tolist())
+        total = by_class[found] @ self.grid.car.powers(np.exp((slowest + found) / _SPEED_CLASSES_PER_E).tolist())
         gain: Array = np.interp(self._waves.log_n, _LOG_WAVE_NUMBERS, np.sqrt(total), right=0.0) ** 2
         return gain / max(self.seen_points(weight > 0), 1)
 
@@ -267,8 +283,8 @@ class Block:
     def about(self, row: Array) -> Array:
         """Mean (count,) of a row (y,) over the readings that show a step of the road at each point, as much as they do
         with either axle; between the nearest where none does."""
-        row = self._per_sample(row) / self._grid.reads
-        back = np.fft.irfft(np.fft.rfft(row) * np.conj(self._grid.step_power), len(row))
+        row = self._per_sample(row) / self.grid.reads
+        back = np.fft.irfft(np.fft.rfft(row) * np.conj(self.grid.step_power), len(row))
         points = self._points.ravel()
         weight = np.bincount(points, self._shares.ravel(), self.count)
         total = np.bincount(points, (self._shares * back).ravel(), self.count)
@@ -278,12 +294,12 @@ class Block:
     def felt(self, row: Array) -> Array:
         """Mean (t,) of a row (count,) over the places whose steps of the road each sample shows, as much as it does."""
         low, high = row.take(self._points) * self._shares
-        under = np.fft.rfft(low + high) * self._grid.step_power
+        under = np.fft.rfft(low + high) * self.grid.step_power
         return np.maximum(np.fft.irfft(under, len(self._front)).mean(axis=0), row.min())
 
     def _per_sample(self, row: Array) -> Array:
         """Sum (t,) of a row (y,) over the readings of each sample."""
-        return row.reshape(-1, self._grid.reads).sum(axis=1)
+        return row.reshape(-1, self.grid.reads).sum(axis=1)
 
     def driven(self, road: Complex) -> Array:
         """A r: the readings (y,) [m/s2] of the car on a road, which is given by the rfft of its elevations [m]."""
@@ -298,10 +314,10 @@ class Block:
         return np.fft.rfft(self._scattered(row)) * self._averaged
 
     def _read(self, under: Complex) -> Array:
-        first, *others = under * self._grid.by_axle
+        first, *others = under * self.grid.by_axle
         for one in others:
             first += one
-        return at_readings(first, len(self._front), self._grid.reads)
+        return at_readings(first, len(self._front), self.grid.reads)
 
     def _under(self, elevation: Array) -> Complex:
         low, high = elevation.take(self._points) * self._shares
@@ -309,7 +325,7 @@ class Block:
 
     def _scattered(self, row: Array) -> Array:
         count = len(self._front)
-        back = np.fft.irfft(np.fft.rfft(row)[:count // 2 + 1] * np.conj(self._grid.by_axle), count)
+        back = np.fft.irfft(np.fft.rfft(row)[:count // 2 + 1] * np.conj(self.grid.by_axle), count)
         return np.asarray(np.bincount(self._points.ravel(), (self._shares * back).ravel(), self.count), np.float64)
 
 

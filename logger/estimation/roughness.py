@@ -28,14 +28,12 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from logger.arrays import Array, Bools, Complex
+from logger.estimation.scored_variances import ScoredVariances
 
 LENGTHS_M = np.array([10.0, 100.0, 10_000.0])
 # Of the log variance, before a road is known: half of all roads between 1.1 and 5.7 m/km make the last.
-_COMMON_VARIANCES = np.array([0.05, 0.15, 1.8**2])
-_LEARNT = slice(2)
+_COMMON_VARIANCES, _LONGEST_VARIANCE = np.array([0.05, 0.15]), 1.8**2
 _VARIANCE_LOG_STD = 1.5  # by how much roads differ in that
-_LEAST_VARIANCE, _LARGEST_VARIANCE = 1e-3, 4.0
-_BLOCK_SHARE = 0.1  # of a block of 20 s is new
 _SMOOTHEST, _ROUGHEST = -12.0, 8.0  # L of roads that have an IRI of 0.006 and 140 m/km
 _CELL_M = 8.0
 _MOST_CELLS = 256  # at once: 2 km, and blocks of 20 s are shorter. A place that jumps must cost no memory
@@ -113,8 +111,7 @@ class RoadLevels:
         self._first = 0
         self._log_scale, self._scale_error, self._excess = np.empty(0), np.empty(0), np.empty(0)
         self._level: _Level | None = None
-        self._log_variances = np.log(_COMMON_VARIANCES)
-        self._curvature: Array | float = 0.0
+        self._scored = ScoredVariances(_COMMON_VARIANCES, _VARIANCE_LOG_STD)
         self.curvature: float | None = None
         self.moved = 0.0
         self._held: Array | None = None
@@ -124,7 +121,7 @@ class RoadLevels:
     @property
     def variances(self) -> Array:
         """Of L, what each process of ``LENGTHS_M`` makes of it, as learnt."""
-        return np.exp(self._log_variances)
+        return np.append(self._scored.values, _LONGEST_VARIANCE)
 
     def held_at(self, log_variance: Array) -> RoadLevels:
         """The same road with this log variance (n,), point by point of one block, which stays."""
@@ -238,7 +235,7 @@ class RoadLevels:
         level[edge - begin:] = np.clip(now + step, _SMOOTHEST, _ROUGHEST)
         self.moved = float(np.sqrt(np.mean(step**2)))
         if learns:
-            self._learn_variances(alike[_LEARNT], pull, self._level.spread)
+            self._learn_variances(alike[:-1], pull, self._level.spread)
 
     def _carried(self, old: _Level, edge: int) -> tuple[Array, Array]:
         """State and its covariance by a Kalman filter over the cells between the old edge and this one."""
@@ -255,16 +252,11 @@ class RoadLevels:
 
     def _learn_variances(self, alike: Array, pull: Array, spread: Array) -> None:
         """One scoring step in the evidence of what was shown, N(mean, inverse of ``spread``)."""
-        parts = self.variances[_LEARNT, None, None] * alike
+        parts = self._scored.values[:, None, None] * alike
         products = parts @ spread
         slope = 0.5 * (parts @ pull @ pull - np.trace(products, axis1=1, axis2=2))
         curvature = 0.5 * (products * products.transpose(0, 2, 1)).sum(axis=(1, 2))
-        self._curvature = (1 - _FORGOTTEN) * self._curvature + _BLOCK_SHARE * curvature
-        logs, precision = self._log_variances[_LEARNT], _VARIANCE_LOG_STD**-2
-        pulled_back = _FORGOTTEN * precision * (logs - np.log(_COMMON_VARIANCES[_LEARNT]))
-        step = (_BLOCK_SHARE * slope - pulled_back) / (self._curvature + precision)
-        self._log_variances[_LEARNT] = np.clip(logs + np.clip(step, -_LARGEST_STEP, _LARGEST_STEP),
-                                               np.log(_LEAST_VARIANCE), np.log(_LARGEST_VARIANCE))
+        self._scored.learn(slope, curvature)
 
     def _learn_scatter(self, power: Array, weight: Array, gain: Array, inside: Bools) -> None:
         """By how much the local means of a block scatter more than chance makes them: their variance less that of a

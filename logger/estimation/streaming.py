@@ -259,9 +259,9 @@ class RoadEstimator:
 
     def _hop(self, fresh: RoadSamples) -> list[WindowEstimate]:
         if self._samples is None:
-            self._samples = RoadSamples.unread(
-                BLOCK_SAMPLES, float(fresh.distance_m[0]), fresh.mean_step_m, self._reads)
-            windows = ceil(fresh.distance_m[0] / (self._piece_m * self._pieces_per_window) - 1e-9)
+            first_m, step_m = float(fresh.distance_m[0]), float(np.diff(fresh.distance_m).mean())
+            self._samples = RoadSamples.unread(BLOCK_SAMPLES, first_m, step_m, self._reads)
+            windows = ceil(first_m / (self._piece_m * self._pieces_per_window) - 1e-9)
             self._next = windows * self._pieces_per_window
         self._samples = self._samples.part(len(fresh), BLOCK_SAMPLES).then(fresh)
         self._beyond = np.concatenate([self._beyond[len(fresh):], np.zeros(len(fresh))])

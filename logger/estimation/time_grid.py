@@ -52,11 +52,6 @@ class RoadSamples:
         shape = (count, reads)
         return cls(np.zeros(shape), np.zeros(shape, dtype=np.bool_), np.zeros(shape), distance_m)
 
-    @property
-    def mean_step_m(self) -> float:
-        """From sample to sample [m]; 0 for a single one."""
-        return float(self.distance_m[-1] - self.distance_m[0]) / max(len(self) - 1, 1)
-
     def speed_mps(self, begin_m: float, end_m: float) -> float | None:
         """Mean speed between two places while the car moved; None when it is too slow for an estimate."""
         low, high = np.searchsorted(self.distance_m, [begin_m, end_m])

@@ -18,7 +18,7 @@ from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.models import structure_of
 from logger.vehicle.structure import body_point
 
-NOISE_MPS2 = 0.06
+NOISE_MPS2, DRIFT = 0.06, 0.05**2
 RAV4 = structure_of(read_vehicle(vehicle_file("rav4-2009")))
 
 
@@ -113,12 +113,12 @@ def test_slope_is_that_of_the_exact_evidence_of_a_drive(variance_of: Callable[[B
         scaled = np.fft.irfft(np.fft.rfft(matrix, axis=1) * shape, block.count, axis=1)
         drift = time_grid(1024).drift.T
         covariance = (scaled * variance) @ scaled.T + NOISE_MPS2**2 * np.eye(1024)
-        covariance += drift @ np.diag(1 / time_grid(1024).drift_precision) @ drift.T
+        covariance += drift @ np.diag(1 / time_grid(1024).drift_precision(DRIFT)) @ drift.T
         return float(-0.5 * np.linalg.slogdet(covariance)[1] - 0.5 * reading @ np.linalg.solve(covariance, reading)
                      + log_prior(there, None))
 
     weight = np.full(1024, NOISE_MPS2**-2)
-    solution = block.solve(reading, weight, now, variance, 400)
+    solution = block.solve(reading, weight, now, variance, DRIFT, 400)
     share = block.seen_points(weight > 0) / block.count
     resolved = mean_resolved(solution.gain, variance[block.seen(weight > 0) > 0])
     found = learnt(now, whitened(block, solution, variance), resolved, block.log_waves, share, None)
@@ -155,7 +155,7 @@ def test_level_and_waviness_are_found_again(speed_mps: float) -> None:
             reading = block.driven(road) + rng.normal(0, NOISE_MPS2, count)
             spectrum, waves = COMMON_ROAD, None
             for _ in range(8):
-                solution = block.solve(reading, weight, spectrum, even, 8, waves)
+                solution = block.solve(reading, weight, spectrum, even, DRIFT, 8, waves)
                 waves = solution.waves
                 resolved = solution.gain / (1 + solution.gain)
                 spectrum = learnt(spectrum, whitened(block, solution, even), resolved, block.log_waves, share, None)

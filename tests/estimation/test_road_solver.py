@@ -21,6 +21,7 @@ from ..support.slow import slow
 
 RATE_HZ, SPACING_M, ALIGN_M = 100.0, 0.1524, 7.62
 ROAD = RoadSpectrum.of_iri(3.0)
+DRIFT = 0.05**2
 
 
 def car(name: str) -> Structure:
@@ -136,8 +137,8 @@ def test_readings_between_samples_are_those_of_the_same_motion() -> None:
     assert several.driven(np.fft.rfft(road)) @ row == pytest.approx(road @ back, rel=1e-10)
     weight = weights(count)
     weight[-200:] = 0.0  # the end of a block meets its beginning
-    one = single.solve(found[::reads] + 9.8, weight, ROAD, even(single), 300)
-    many = several.solve(found + 9.8, np.repeat(weight, reads) / reads, ROAD, even(several), 300)
+    one = single.solve(found[::reads] + 9.8, weight, ROAD, even(single), DRIFT, 300)
+    many = several.solve(found + 9.8, np.repeat(weight, reads) / reads, ROAD, even(several), DRIFT, 300)
     assert many.gain == pytest.approx(one.gain)
     assert np.abs(many.road - one.road).max() < 0.02 * np.abs(one.road).max()
 
@@ -169,26 +170,46 @@ def test_the_solution_is_that_of_dense_algebra_with_drift(
     variance = variance_of(block)
     grid = time_grid("rav4-2009", 640)
     both = np.hstack([matrix, grid.drift.T])
-    precision = np.concatenate([1 / variance, grid.drift_precision])
+    precision = np.concatenate([1 / variance, grid.drift_precision(DRIFT)])
     exact = np.linalg.solve(both.T @ (weight[:, None] * both) + np.diag(precision), both.T @ (weight * reading))
-    found = block.solve(reading, weight, ROAD, variance, steps)
+    found = block.solve(reading, weight, ROAD, variance, DRIFT, steps)
     assert np.fft.irfft(found.waves, block.count) == pytest.approx(exact[:block.count], abs=1e-6)
     assert found.drift_mps2 == pytest.approx(exact[block.count:] @ grid.drift, abs=1e-6)
     assert found.fitted_mps2 == pytest.approx(both @ exact, abs=1e-6)
     assert found.road == pytest.approx(found.waves * block.wave_factors(ROAD))
 
 
+def test_drift_is_judged_by_the_evidence() -> None:
+    """Slope in the log variance of its cosines, by dense algebra; the road hardly answers as slowly as they swing."""
+    block, matrix, reading, weight = small_problem()
+    reading = reading + 0.2 * block.grid.drift[1]
+    used = weight > 0
+
+    def log_evidence(variance: float) -> float:
+        drift = block.grid.drift.T / np.sqrt(block.grid.drift_precision(variance))
+        covariance = (matrix @ matrix.T + drift @ drift.T)[np.ix_(used, used)] + np.diag(1 / weight[used])
+        y = reading[used]
+        return float(-0.5 * np.linalg.slogdet(covariance)[1] - 0.5 * y @ np.linalg.solve(covariance, y))
+
+    for variance in (0.01**2, DRIFT, 0.3**2):
+        found = block.solve(reading, weight, ROAD, even(block), variance, 200)
+        left, slope, curvature = block.grid.drift_evidence(found, variance, 1.0)
+        exact = (log_evidence(variance * np.exp(0.05)) - log_evidence(variance * np.exp(-0.05))) / 0.1
+        assert slope == pytest.approx(exact, rel=0.1, abs=0.02)
+        assert 0 < curvature <= 0.5 and (left > 0).all()
+
+
 def test_more_steps_get_nearer_and_going_on_is_no_restart() -> None:
     """In the Golden Car's slope on the whole block, against the settled solution."""
     block, _, reading, weight = small_problem()
-    exact = block.solve(reading, weight, ROAD, even(block), 200)
+    exact = block.solve(reading, weight, ROAD, even(block), DRIFT, 200)
 
     def off(waves: np.ndarray) -> float:
         slopes = (waves - exact.waves) * block.wave_factors(ROAD) * golden_car_slope(block.wave_number_cpm)
         return float(np.linalg.norm(slopes))
 
-    few, more, most = (block.solve(reading, weight, ROAD, even(block), steps).waves for steps in (8, 16, 40))
-    further = block.solve(reading, weight, ROAD, even(block), 8, few).waves
+    few, more, most = (block.solve(reading, weight, ROAD, even(block), DRIFT, steps).waves for steps in (8, 16, 40))
+    further = block.solve(reading, weight, ROAD, even(block), DRIFT, 8, few).waves
     none = off(np.zeros_like(few))
     assert 0.25 * none > off(few) > off(more) > off(most) and off(most) < 0.02 * none
     assert off(further) < 0.7 * off(few)
@@ -221,7 +242,7 @@ def test_what_an_earlier_block_found_is_a_head_start(hop: int) -> None:
     earlier, later = (Block(time_grid("rav4-2009", count), distance_m[part], SPACING_M, ALIGN_M) for part in parts)
     whole = Block(time_grid("rav4-2009", count + hop), distance_m, SPACING_M, ALIGN_M)
     reading = whole.driven(a_road(whole, rng)) + rng.normal(0, 0.06, count + hop)
-    found = [block.solve(reading[part], weights(count), ROAD, even(block), 60).waves
+    found = [block.solve(reading[part], weights(count), ROAD, even(block), DRIFT, 60).waves
              for block, part in zip((earlier, later), parts, strict=True)]
     start = later.carried_over(earlier, found[0])
     assert start.shape == found[1].shape
@@ -232,7 +253,7 @@ def test_what_an_earlier_block_found_is_a_head_start(hop: int) -> None:
         return np.fft.irfft(waves * golden, later.count)[inside]
 
     cold, warm = (
-        later.solve(reading[parts[1]], weights(count), ROAD, even(later), 4, one).waves for one in (None, start)
+        later.solve(reading[parts[1]], weights(count), ROAD, even(later), DRIFT, 4, one).waves for one in (None, start)
     )
     assert np.std(slope(warm) - slope(found[1])) < 0.5 * np.std(slope(cold) - slope(found[1]))
 
@@ -249,13 +270,13 @@ def test_blocks_that_do_not_overlap_hand_nothing_over() -> None:
 def test_readings_without_weight_change_no_bit(garbage: float) -> None:
     block, _, reading, weight = small_problem()
     other = np.where(weight > 0, reading, garbage)
-    one, two = (block.solve(row, weight, ROAD, uneven(block), 6) for row in (reading, other))
+    one, two = (block.solve(row, weight, ROAD, uneven(block), DRIFT, 6) for row in (reading, other))
     assert (one.waves == two.waves).all() and (one.fitted_mps2 == two.fitted_mps2).all()
 
 
 def test_no_readings_give_the_flat_road() -> None:
     block, _, reading, _ = small_problem()
-    found = block.solve(reading, np.zeros(640), ROAD, uneven(block), 6)
+    found = block.solve(reading, np.zeros(640), ROAD, uneven(block), DRIFT, 6)
     assert not found.waves.any() and not found.fitted_mps2.any() and not found.gain.any()
 
 
@@ -266,7 +287,7 @@ def test_at_a_steady_speed_it_is_the_wiener_filter(speed_mps: float) -> None:
     count = 2048 if speed_mps > 10 else 8192  # the wheelbase's notches are filled from far along the road
     block = Block(time_grid("rav4-2009", count), way(count, [speed_mps] * 2), SPACING_M, ALIGN_M)
     reading = block.driven(a_road(block, rng)) + rng.normal(0, 0.06, count)
-    found = block.solve(reading, np.full(count, 0.06**-2), ROAD, even(block), 40)
+    found = block.solve(reading, np.full(count, 0.06**-2), ROAD, even(block), DRIFT, 40)
 
     f_hz = np.fft.rfftfreq(count, 1 / RATE_HZ)
     seen = (f_hz > 0) & (f_hz <= 42.0)
@@ -287,7 +308,7 @@ def test_at_a_steady_speed_it_is_the_wiener_filter(speed_mps: float) -> None:
 def test_gain_is_the_information_of_a_steady_speed() -> None:
     """Signal over noise of each wave, |H|^2 S / N."""
     block = a_block(speeds_mps=[20.0, 20.0])
-    gain = block.solve(np.zeros(1024), np.full(1024, 0.06**-2), ROAD, even(block), 1).gain
+    gain = block.solve(np.zeros(1024), np.full(1024, 0.06**-2), ROAD, even(block), DRIFT, 1).gain
     middle = (block.wave_number_cpm > 0.01) & (block.wave_number_cpm < 1.5)
     n = block.wave_number_cpm[middle]
     power = np.abs(body_acceleration_response(car("rav4-2009"), n * 20.0, 20.0)) ** 2
@@ -315,7 +336,7 @@ def test_seen_points_and_seen_places() -> None:
 def test_a_car_that_stands_all_the_time() -> None:
     block = Block(time_grid("rav4-2009", 640), np.full(640, 50.0), SPACING_M, ALIGN_M)
     assert not block.moving.any()
-    found = block.solve(np.full(640, 9.81), weights(640), ROAD, even(block), 6)
+    found = block.solve(np.full(640, 9.81), weights(640), ROAD, even(block), DRIFT, 6)
     assert np.isfinite(found.road).all() and found.fitted_mps2 == pytest.approx(np.full(640, 9.81), abs=1e-3)
 
 
@@ -326,7 +347,7 @@ def test_a_place_that_jumps_costs_no_short_waves() -> None:
     block = Block(time_grid("rav4-2009", 2048), distance_m, SPACING_M, ALIGN_M)
     reading = block.driven(a_road(block, rng)) + rng.normal(0, 0.06, 2048)
     jumped = Block(time_grid("rav4-2009", 2048), distance_m + 4.0 * (np.arange(2048) > 1200), SPACING_M, ALIGN_M)
-    roads = [one.solve(reading, weights(2048), ROAD, even(one), 30).road for one in (block, jumped)]
+    roads = [one.solve(reading, weights(2048), ROAD, even(one), DRIFT, 30).road for one in (block, jumped)]
     slopes = [
         np.fft.irfft(road * golden_car_slope(one.wave_number_cpm), one.count)
         for one, road in zip((block, jumped), roads, strict=True)
@@ -353,7 +374,7 @@ def test_another_car_on_the_same_stretch_is_as_if_it_had_been_its_own() -> None:
     moved = Block(own, way(1024, [12.0, 20.0]), SPACING_M, ALIGN_M).on(other)
     reading, weight = rng.standard_normal(1024), weights(1024)
     assert moved.car is other.car
-    one, two = (block.solve(reading, weight, ROAD, uneven(block), 4) for block in (there, moved))
+    one, two = (block.solve(reading, weight, ROAD, uneven(block), DRIFT, 4) for block in (there, moved))
     assert np.array_equal(one.road, two.road) and np.array_equal(one.fitted_mps2, two.fitted_mps2)
 
 
@@ -369,8 +390,9 @@ def test_waves_that_the_time_grid_cannot_hold_have_no_factor(speeds_mps: list[fl
 def test_innovations_are_the_waves_of_a_solution() -> None:
     block = a_block()
     rng = np.random.default_rng(9)
-    first = block.solve(rng.standard_normal(1024), weights(1024), ROAD, uneven(block), 5)
-    for found in (first, block.solve(rng.standard_normal(1024), weights(1024), ROAD, uneven(block), 3, first.waves)):
+    first = block.solve(rng.standard_normal(1024), weights(1024), ROAD, uneven(block), DRIFT, 5)
+    later = block.solve(rng.standard_normal(1024), weights(1024), ROAD, uneven(block), DRIFT, 3, first.waves)
+    for found in (first, later):
         assert found.innovations == pytest.approx(np.fft.irfft(found.waves, block.count), abs=1e-9)
 
 
@@ -379,5 +401,5 @@ def test_readings_that_weigh_next_to_nothing_leave_a_flat_road() -> None:
     block = a_block()
     reading = np.random.default_rng(3).normal(0, 0.3, 1024)
     for noise_mps2 in np.geomspace(1e3, 1e12, 10):
-        solved = block.solve(reading, weights(1024, noise_mps2), ROAD, np.full(block.count, 1e-3), 40)
+        solved = block.solve(reading, weights(1024, noise_mps2), ROAD, np.full(block.count, 1e-3), DRIFT, 40)
         assert np.isfinite(solved.innovations).all() and np.abs(solved.innovations).max() < 1e-3

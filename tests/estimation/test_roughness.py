@@ -20,6 +20,7 @@ from logger.vehicle.structure import body_point
 from ..support.slow import slow
 
 SPACING_M, COUNT, SPEED_MPS, NOISE_MPS2 = 0.1524, 1024, 18.0, 0.06
+DRIFT = 0.05**2
 ROAD = RoadSpectrum.of_iri(2.5)  # as rough as the common road
 RAV4 = structure_of(read_vehicle(vehicle_file("rav4-2009")))
 
@@ -56,7 +57,7 @@ def settled(reading: np.ndarray, rounds: int = 16) -> RoadLevels:
     found, start = RoadLevels(SPACING_M), None
     for _ in range(rounds):
         log_variance = found.solved_with(0, block.count)
-        solution = block.solve(reading, weights(), ROAD, np.exp(log_variance), 12, start)
+        solution = block.solve(reading, weights(), ROAD, np.exp(log_variance), DRIFT, 12, start)
         start = solution.waves
         found.learn(0, np.fft.irfft(start, block.count), log_variance, solution.gain, seen.astype(float))
     return found
@@ -66,7 +67,7 @@ def log_evidence(reading: np.ndarray, variance: np.ndarray) -> float:
     """log N(y; 0, B D B' + drift + noise) of what was read."""
     _, matrix, _ = a_block()
     drift = a_grid().drift.T
-    covariance = (matrix * variance) @ matrix.T + (drift / a_grid().drift_precision) @ drift.T
+    covariance = (matrix * variance) @ matrix.T + (drift / a_grid().drift_precision(DRIFT)) @ drift.T
     used = weights() > 0
     covariance = (covariance + NOISE_MPS2**2 * np.eye(COUNT))[np.ix_(used, used)]
     y = reading[used]
@@ -128,7 +129,7 @@ def test_one_round_is_newtons_with_the_exact_posterior(variance_of: Callable[[],
     scale = (4 + power[inside] * np.exp(-level[cells[inside]])) / (4 + taken[inside])
     expected = level[cells[inside]] + 0.6 * np.log(scale) + 0.4 * (np.log(before[inside]) - level[cells[inside]])
 
-    found, gain = RoadLevels(SPACING_M), block.solve(reading, weights(), ROAD, before, 1).gain
+    found, gain = RoadLevels(SPACING_M), block.solve(reading, weights(), ROAD, before, DRIFT, 1).gain
     found.learn(0, innovations, np.log(before), gain, seen.astype(float))
     chosen = np.flatnonzero(seen)[40:-40]
     expected = expected[chosen - np.flatnonzero(inside)[0]]
@@ -299,7 +300,7 @@ def learnt_over_drives(variance: np.ndarray) -> tuple[float, RoadLevels]:
         reading, start = read(variance, rng), None
         for left in reversed(range(4)):
             before = found.solved_with(0, block.count)
-            solution = block.solve(reading, weights(), ROAD, np.exp(before), 12, start)
+            solution = block.solve(reading, weights(), ROAD, np.exp(before), DRIFT, 12, start)
             start = solution.waves
             found.learn(0, np.fft.irfft(start, block.count), before, solution.gain, seen.astype(float), 1.0, left == 0)
         if drive > 8:

@@ -1,0 +1,31 @@
+"""Variances that a drive tells little by little: scoring in the evidence, block by block."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from logger.arrays import Array
+
+_BLOCK_SHARE = 0.1  # of a block of 20 s is new
+_FORGOTTEN = 0.02  # per block, of what was heard: they are known from the last 100 s
+_LARGEST_STEP = 0.7
+
+
+class ScoredVariances:
+    """Variances (k,), of which only their ``common`` values are known before, but for ``log_std`` of their logarithms.
+
+    values    as learnt
+    """
+
+    def __init__(self, common: Array, log_std: float) -> None:
+        self.values = common
+        self._common_logs, self._precision = np.log(common), log_std**-2
+        self._curvature: Array | float = 0.0
+
+    def learn(self, slope: Array, curvature: Array) -> None:
+        """One step, by slope and expected curvature (k,) of a block's log evidence in the logarithms."""
+        logs = np.log(self.values)
+        self._curvature = (1 - _FORGOTTEN) * self._curvature + _BLOCK_SHARE * curvature
+        pulled_back = _FORGOTTEN * self._precision * (logs - self._common_logs)
+        step = (_BLOCK_SHARE * slope - pulled_back) / (self._curvature + self._precision)
+        self.values = np.exp(logs + np.clip(step, -_LARGEST_STEP, _LARGEST_STEP))
