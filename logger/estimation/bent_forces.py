@@ -84,7 +84,8 @@ def _beyond(laws: CornerLaws, slopes: CornerSlopes, motion: Array, std: Array) -
     if laws.dry_friction_n:
         share = motion[1] / max(sqrt(std[1]**2 + laws.friction_transition_mps**2), _AT_REST_MPS)
         # nearly its mean over a normal distribution, which is an erf
-        force += laws.dry_friction_n * np.tanh(sqrt(2 / np.pi) * (share * (1 + 0.044715 * share * share)))
+        force += laws.dry_friction_n * laws.stribeck.times(motion[1]) * np.tanh(
+            sqrt(2 / np.pi) * (share * (1 + 0.044715 * share * share)))
     return force
 
 

@@ -15,7 +15,6 @@ from functools import cached_property
 import numpy as np
 
 from logger.arrays import Array
-from logger.lab.likelihood.map_fit import fit_model
 from logger.lab.likelihood.noise_floor import floor_error, sensor_noise_with_rounding
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
@@ -28,6 +27,7 @@ from logger.lab.residual_tests.tests import ResidualEvidence, ResidualTestResult
 from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown
 from logger.lab.residuals.removed import Removed, removed_from
 from logger.lab.selection.holdout import AS_FILED, REFITTED, ErrorStep, cross_validate
+from logger.lab.selection.starts import fitted_from_starts
 from logger.runs import normalised_rms_error, signal_errors
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import Car, Response, compose
@@ -121,7 +121,7 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
     plain = Standing.of(runs, car, runs.predict(car), runs.respond(car))
     posterior = Posterior(runs, given or vehicle, tolerance or Tolerance(), vehicle)
     names = posterior.prior.names
-    linear = fit_model(posterior, posterior.start(effects))
+    linear = fitted_from_starts(posterior, effects)
     state = linear.state
     car = posterior.car(state.effects, state.logs)
     refitted = Standing.of(runs, car, state.predictions, runs.respond(car, posterior.distance_error_m(state.record)))

@@ -110,6 +110,7 @@ class LabDiagnosis:
                          is more than a sensor's gain is off by
     excess_of            as ``excess``, by signal; empty: the sensor's acceleration
     band                 in which the runs were compared; None: all
+    state                of the model that it ends with
     car                  numbers and laws as fitted
     coloured             whether the noise has a colour: it is louder at some frequencies than at the highest
     ends                 of how many starts the fit of an effect ended at the best, by name; where numbers are not known
@@ -139,6 +140,7 @@ class LabDiagnosis:
     signals_off: Mapping[str, float] = field(default_factory=dict)
     excess_of: Mapping[str, float] = field(default_factory=dict)
     band: ComparedBand | None = None
+    state: State | None = None
     car: FittedCar | None = None
     coloured: bool = False
     tolerance: float = Tolerance().share
@@ -226,6 +228,14 @@ def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present:
                    progress: Progress = lambda words: None, effort: SearchEffort | None = None
                    ) -> tuple[Search, Selection]:
     """The search of a diagnosis and its result; arguments as of ``diagnose``."""
+    search, before = begin_search(posterior, effects, present, progress, effort)
+    return search, search.run(before)
+
+
+def begin_search(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
+                 progress: Progress = lambda words: None, effort: SearchEffort | None = None
+                 ) -> tuple[Search, Baseline]:
+    """The search and the fitted model that it begins at; arguments as of ``diagnose``."""
     obstacles = obstacles_of(posterior, effects, present)
     tried = [one for name, one in effects.items() if name not in obstacles]
     progress("refitting the model's parameters")
@@ -236,7 +246,7 @@ def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present:
         tried, len(present), misalignment(posterior, nominal), progress,
         effort=effort or (SearchEffort() if unknown is None else SearchEffort(fitted=3)),
         likelihood=unknown or MeasuredRoad())
-    return search, search.run(before)
+    return search, before
 
 
 def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen], search: Search,
@@ -288,7 +298,7 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
         removed=removed, band=compared_band(fine.runs.runs), signals=signal_errors_of(fine, baseline, state),
         shows_forces=fine.shows_forces, best_linear=_best_linear(selection.before),
         signals_off=signals_off(fine.record_errors, state.record), excess_of=excess_of,
-        car=fitted_car(fine, baseline, state), tolerance=posterior.tolerance.share,
+        state=state, car=fitted_car(fine, baseline, state), tolerance=posterior.tolerance.share,
     )
 
 

@@ -279,7 +279,7 @@ def _friction_of_held(laws: CornerLaws, rate_mps: Array, rise_mps2: Array, step_
 
     over = np.abs(way) > _NO_RISE_MPS
     mean = (integral(rate_mps + way) - integral(rate_mps - way)) / np.where(over, 2 * way, 1.0)
-    return np.where(over, laws.dry_friction_n * mean, laws.friction_n(rate_mps))
+    return np.where(over, laws.dry_friction_n * mean * laws.stribeck.times(rate_mps), laws.friction_n(rate_mps))
 
 
 def _preload(force_n: float, travel_m: Array) -> Array:

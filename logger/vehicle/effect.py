@@ -126,28 +126,32 @@ class Parameter:
         ways = [abs(self.coordinate(one) - origin) for one in (self.start, *self.trials)]
         return ways[0] or max(ways) or abs(self.coordinate(self.high) - self.coordinate(self.low))
 
+    def is_at(self, end: float, value: float) -> bool:
+        """Whether a value is at an end of what it may be: within a small share of the usual way from there, on the
+        scale that fits move on."""
+        there = self.coordinate(end)
+        return abs(self.coordinate(value) - there) < _AT_BOUND * self.usual_range(origin=there)
+
     def at_bound(self, value: float) -> bool:
-        """Whether a value is at an end of what it may be."""
-        here = self.coordinate(value)
-        return any(abs(here - self.coordinate(end)) < _AT_BOUND for end in (self.low, self.high))
+        """Whether a value is at either end."""
+        return self.is_at(self.low, value) or self.is_at(self.high, value)
 
     def at_weakest_bound(self, value: float) -> bool:
-        """Whether a strength is at the end of its range beyond which lies the value at which it does nothing: within a
-        small share of the usual way from there, on the scale that fits move on."""
+        """Whether a strength is at the end beyond which lies the value at which it does nothing."""
         if self.null is None or self.low < self.null < self.high:
             return False
-        weakest = self.coordinate(self.low if self.null <= self.low else self.high)
-        return abs(self.coordinate(value) - weakest) < _AT_BOUND * self.usual_range(origin=weakest)
-
-    def is_lowest(self, value: float) -> bool:
-        """Whether a value is at the low end of what it may be, to the same share."""
-        lowest = self.coordinate(self.low)
-        return abs(self.coordinate(value) - lowest) < _AT_BOUND * self.usual_range(origin=lowest)
+        return self.is_at(self.low if self.null <= self.low else self.high, value)
 
 
 AXLE = Parameter("axle", 0.0, 0.0, 2.0, None, Scale.LINEAR, (0.0,), "where it acts: 1 at the front, 2 at the rear, "
                  "0 at both", choices=(0.0, 1.0, 2.0), default=0.0, given=True)
 """Of an effect of suspensions, which may sit in those of one axle alone. A search tries both, and then each."""
+
+STATIC_RATIO = Parameter("static_to_sliding_ratio", 1.5, 1.0, 10.0, None, Scale.LINEAR, (1.5,),
+                         "friction at rest over that in motion", default=1.0)
+STRIBECK_VELOCITY = Parameter("stribeck_velocity_m_per_s", 0.05, 1e-5, 10.0, None, Scale.LOG, (0.05,),
+                              "rate at which 1 / e of what is more at rest is left", default=0.05)
+"""Of a friction that holds more than it rubs."""
 
 
 @dataclass(frozen=True)
@@ -198,6 +202,8 @@ class Effect(ABC):
     underlies    whether it is nearly always there and hides others: these are tried on top of it where none is seen
     also_by      those of its parameters that are strengths beside the one that has a null: it vanishes where all are at
                  their lows
+    refinements  those of its parameters that say more of it than its plain form does, which it has while all of them
+                 are at their defaults: no fit moves them then, and a search tries both
     variants     by the vehicle's model: the effect that stands in its place, where that has fewer parts than the
                  parameters speak of
     """
@@ -222,6 +228,7 @@ class Effect(ABC):
     underlies: bool = False
     also_by: tuple[str, ...] = ()
     stage: int = 0
+    refinements: tuple[str, ...] = ()
     variants: Mapping[str, Effect] = MappingProxyType({})
 
     def __init_subclass__(cls) -> None:
@@ -255,7 +262,12 @@ class Effect(ABC):
     def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
         """Values of all its parameters that a search begins at; some effects look at how the runs are misaligned."""
         names = [one.name for one in self.parameters]
-        return [dict(zip(names, values, strict=True)) for values in product(*(one.trials for one in self.parameters))]
+        usual = self.usual
+        ways = [[(usual[one.name],) if one.name in self.refinements else one.trials for one in self.parameters]]
+        if self.refinements:
+            ways.append([one.trials if one.name in self.refinements else
+                         (usual[one.name] if one.given else one.start,) for one in self.parameters])
+        return [dict(zip(names, values, strict=True)) for way in ways for values in product(*way)]
 
     def delaying_trials(self, seen: Misalignment) -> list[list[dict[str, float]]]:
         """Values that delay slow motions so much that distances which were fitted without it have absorbed the delay: a
@@ -398,17 +410,30 @@ class Chosen:
 
     @property
     def at_bound(self) -> bool:
-        """Whether an effect that has a strength has it in a shape at the end of its range (a frequency, a damping), or
-        can be no weaker, or shifts a record as far as it may: what looks like it is something else."""
-        numbers = [one for one in self.effect.parameters if one.is_free]
+        """Whether nothing of an effect that has a strength was measured, as all its numbers are at ends of their
+        ranges, or it can be no weaker, or a shape is at the end of its range (a frequency, a damping): what looks like
+        it is something else."""
+        numbers = self.freed
         besides = [one for one in numbers if one.name in self.effect.also_by]
         if (any(one.at_weakest_bound(self.values[one.name]) for one in numbers)
-                and all(one.is_lowest(self.values[one.name]) for one in besides)):
+                and all(one.is_at(one.low, self.values[one.name]) for one in besides)):
             return True
-        if not self.effect.reshapes and any(one.at_bound(self.values[one.name]) for one in numbers):
+        if any(one.null is not None for one in numbers) and all(one.at_bound(self.values[one.name]) for one in numbers):
             return True
         shapes = [one for one in numbers if one.null is None and one.scale is Scale.LOG]
         return len(shapes) < len(numbers) and any(one.at_bound(self.values[one.name]) for one in shapes)
+
+    @property
+    def is_plain(self) -> bool:
+        """Whether it is without its refinements."""
+        usual = self.effect.usual
+        return all(self.values[name] == usual[name] for name in self.effect.refinements)
+
+    @property
+    def freed(self) -> list[Parameter]:
+        """Its parameters that a fit may move."""
+        held = self.effect.refinements if self.is_plain else ()
+        return [one for one in self.effect.parameters if one.is_free and one.name not in held]
 
     @property
     def where(self) -> str:

@@ -82,6 +82,22 @@ class MotionLaw:
     memory: tuple[float, ...] = ()
 
 
+class Stribeck(NamedTuple):
+    """How much more than its sliding force a friction is: ``ratio`` at rest, and less the quicker it slides, with
+    ``rate_mps`` [m/s] at which 1 / e of the excess is left (B. Armstrong-Helouvry and others, Automatica 30, 1994)."""
+
+    ratio: float = 1.0
+    rate_mps: float = 1.0
+
+    def times(self, rate_mps: Array) -> Array:
+        """Factors (n,) of the sliding force at these rates (n,)."""
+        return np.asarray(1.0 + (self.ratio - 1.0) * np.exp(-((rate_mps / self.rate_mps) ** 2)))
+
+
+COULOMB = Stribeck()
+"""Of a friction that holds as much as it rubs."""
+
+
 @dataclass(frozen=True)
 class CornerLaws:
     """One suspension and its tire.
@@ -93,9 +109,10 @@ class CornerLaws:
     springs                 forces by travel beyond the linear spring: travel [m] -> force [N]
     dry_friction_n          Coulomb friction parallel to the damper: this force against any motion, up to it at rest
     friction_transition_mps this times tanh(rate / transition) instead, unless 0
+    stribeck                and times this
     wheel_friction_n        Coulomb friction of the wheel against a guide that stands on the ground, as on a test rig
     body_friction_n         the same of the body's end of the suspension
-    guide_transition_mps    as friction_transition_mps, of these two
+    guide_transition_mps    as friction_transition_mps, of these two, as guide_stribeck is of stribeck
     others                  further forces: (travel, rate) -> force
     motions                 and by anything that moves
     tire_damping_n_s_per_m  of the tire
@@ -111,9 +128,11 @@ class CornerLaws:
     springs: tuple[Law, ...] = ()
     dry_friction_n: float = 0.0
     friction_transition_mps: float = 0.0
+    stribeck: Stribeck = COULOMB
     wheel_friction_n: float = 0.0
     body_friction_n: float = 0.0
     guide_transition_mps: float = 0.0
+    guide_stribeck: Stribeck = COULOMB
     others: tuple[Law2, ...] = ()
     motions: tuple[MotionLaw, ...] = ()
     tire_damping_n_s_per_m: float = 0.0
@@ -128,9 +147,9 @@ class CornerLaws:
 
     def friction_n(self, rate_mps: Array) -> Array:
         """Dry friction (n,) of the suspension at these rates (n,) [N]."""
-        if self.friction_transition_mps > 0:
-            return np.asarray(self.dry_friction_n * np.tanh(rate_mps / self.friction_transition_mps))
-        return np.asarray(self.dry_friction_n * np.sign(rate_mps))
+        transition = self.friction_transition_mps
+        grown = np.tanh(rate_mps / transition) if transition > 0 else np.sign(rate_mps)
+        return np.asarray(self.dry_friction_n * grown * self.stribeck.times(rate_mps))
 
     def by_rate_n(self, rate_mps: Array) -> Array:
         """Force (n,) of damper and friction at these rates (n,), at no travel [N]."""

@@ -33,7 +33,7 @@ import numpy as np
 from logger.arrays import Array, Complex
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.effect import Chosen
-from logger.vehicle.laws import Between, CornerLaws, MotionLaw, Seen
+from logger.vehicle.laws import Between, CornerLaws, MotionLaw, Seen, Stribeck
 from logger.vehicle.linear_car import MOTIONS, CornerSlopes, LinearCar, LinearLaw, Waves
 from logger.vehicle.stepping import static_tire_loads_n
 from logger.vehicle.structure import Output
@@ -232,7 +232,7 @@ class _Corner:
         own_rate = max(self.own_rate_mps, _LEAST_RATE_MPS)
         spring, pull = _sloped(sum((law(rest_m + travel * _NORMAL) for law in laws.springs), 0 * _NORMAL), travel)
         damper, drag = _sloped(laws.damper(own_rate * _NORMAL), own_rate)
-        rubs = _rubs(laws.dry_friction_n, laws.friction_transition_mps, rate)
+        rubs = _rubs(laws.dry_friction_n, laws.friction_transition_mps, laws.stribeck, rate)
         if laws.others:
             x, v = np.meshgrid(_NORMAL_OF_TWO, _NORMAL_OF_TWO, indexing="ij")
             force = sum((law(rest_m + travel * x, rate * v) for law in laws.others), 0 * x)
@@ -242,21 +242,22 @@ class _Corner:
         pressed = max(self.deflection_m, _LEAST_TRAVEL_M)
         tire, _ = _sloped(sum((law(pressed * _NORMAL) for law in laws.tires), 0 * _NORMAL), pressed)
         holds = 1.0 if laws.tire_pulls else 0.5 * (1 + erf(load_n / (sqrt(2.0) * self.force_n)))
+        guide = laws.guide_transition_mps, laws.guide_stribeck
         unbalanced = spring_n_per_m * rest_m + pull + drag + sum(mean for _, mean in motions)
         return CornerSlopes(spring, damper, laws.mount_n_per_m, rubs, tire, laws.tire_damping_n_s_per_m, holds,
                             rest_m - unbalanced / (spring_n_per_m + max(spring, 0.0)),
-                            _rubs(laws.wheel_friction_n, laws.guide_transition_mps, self.wheel_mps),
-                            _rubs(laws.body_friction_n, laws.guide_transition_mps, self.body_mps),
+                            _rubs(laws.wheel_friction_n, *guide, self.wheel_mps),
+                            _rubs(laws.body_friction_n, *guide, self.body_mps),
                             tuple(law for law, _ in motions))
 
 
-def _rubs(friction_n: float, transition_mps: float, rate_mps: float) -> float:
+def _rubs(friction_n: float, transition_mps: float, stribeck: Stribeck, rate_mps: float) -> float:
     """Slope of a friction by a rate of this deviation."""
     if not friction_n:
         return 0.0
     rate = max(rate_mps, _LEAST_RATE_MPS)
     held = np.tanh(rate * _NORMAL / transition_mps) if transition_mps else np.sign(_NORMAL)
-    return _sloped(friction_n * held, rate)[0]
+    return _sloped(friction_n * held * stribeck.times(rate * _NORMAL), rate)[0]
 
 
 def _normal(points: int) -> tuple[Array, Array]:

@@ -247,7 +247,8 @@ class FreeParameter:
 def free_parameters_of(effects: Sequence[Chosen], which: Sequence[int] | None = None) -> list[FreeParameter]:
     """Every parameter that a fit may vary, of all effects or of some."""
     chosen = range(len(effects)) if which is None else which
-    return [FreeParameter(i, j) for i in chosen for j, one in enumerate(effects[i].effect.parameters) if one.is_free]
+    return [FreeParameter(i, j) for i in chosen for j, one in enumerate(effects[i].effect.parameters)
+            if one in effects[i].freed]
 
 
 def with_coordinates(effects: Sequence[Chosen], free_parameters: Sequence[FreeParameter], coordinates: Array

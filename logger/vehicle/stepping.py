@@ -24,7 +24,7 @@ import numpy.typing as npt
 from logger.arrays import Array
 from logger.profiles.track import Way
 from logger.units import STANDARD_GRAVITY_MPS2
-from logger.vehicle.laws import MOST_MEMORY, CornerLaws, Law, Law2
+from logger.vehicle.laws import MOST_MEMORY, CornerLaws, Law, Law2, Stribeck
 from logger.vehicle.structure import AT_REST, BASE_INPUTS, Structure, straight_step
 
 if TYPE_CHECKING:
@@ -116,11 +116,11 @@ class Stepper:
             for some in ([transition, at_start[:, u:], *inputs], [at_end[:, u:], held])
         )
         known[-2 * u:] += np.tile(inputs_seen.T, (2, 1))  # at the end of a step: the mean over it, and the rise
-        rubs = [[one.force_n, one.transition_mps, _looked_at(one, -float(forces[2 * w + i, one.places[0]]))]
-                for i, one in enumerate(rubbing)]
+        rubs = [[one.force_n, one.transition_mps, _looked_at(one, -float(forces[2 * w + i, one.places[0]])),
+                 *one.stribeck] for i, one in enumerate(rubbing)]
         return Stepper(
             structure, tuple(laws), step_s, state_and_seen, inputs_seen, known, forces,
-            _tabulated(structure, laws, step_s), np.array(rubs).reshape(-1, 3),
+            _tabulated(structure, laws, step_s), np.array(rubs).reshape(-1, 5),
             np.array([one.places for one in rubbing], dtype=np.int64).reshape(-1, 3))
 
     def march(self, elevation: Array, mean: Array, way: Way | None = None, begins: Array = AT_REST) -> Motion:
@@ -152,17 +152,18 @@ class _Rubs:
 
     force_n: float
     transition_mps: float
+    stribeck: Stribeck
     places: tuple[int, int, int]
 
 
 def _rubbing(laws: Sequence[CornerLaws], m: int) -> list[_Rubs]:
     """All that rubs in a car with so many states: the suspensions, the wheels on their guides, the body on its."""
     w = len(laws)
-    suspensions = [_Rubs(one.dry_friction_n, one.friction_transition_mps, (m + w + i, i, -1))
+    suspensions = [_Rubs(one.dry_friction_n, one.friction_transition_mps, one.stribeck, (m + w + i, i, -1))
                    for i, one in enumerate(laws)]
-    wheels = [_Rubs(one.wheel_friction_n, one.guide_transition_mps, (m + 3 * w + i, -1, w + i))
+    wheels = [_Rubs(one.wheel_friction_n, one.guide_transition_mps, one.guide_stribeck, (m + 3 * w + i, -1, w + i))
               for i, one in enumerate(laws)]
-    body = [_Rubs(one.body_friction_n, one.guide_transition_mps, (m + 4 * w + i, i, w + i))
+    body = [_Rubs(one.body_friction_n, one.guide_transition_mps, one.guide_stribeck, (m + 4 * w + i, i, w + i))
             for i, one in enumerate(laws)]
     return [one for one in (*suspensions, *wheels, *body) if one.force_n > 0]
 
@@ -178,7 +179,7 @@ def _onto(rubbing: Sequence[_Rubs], w: int) -> Array:
 def _looked_at(one: _Rubs, ease: float) -> float:
     """At which share of a step friction looks at the rate, which it can change by force times ``ease``. A half would
     be right to second order, but nothing comes to rest then; what grows slowly with the rate needs hardly more."""
-    pull = ease * one.force_n
+    pull = ease * one.force_n * one.stribeck.ratio
     sudden = pull / (pull + _SLOW * one.transition_mps) if pull > 0 else 1.0
     return _GROWS_AT + (_RUBS_AT - _GROWS_AT) * sudden
 

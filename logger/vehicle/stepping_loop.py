@@ -211,7 +211,7 @@ SPRING, DAMPER, MOUNT, TIRE = range(4)
 PAIR, MOUNT_N_PER_M, MOUNT_LOW, MOUNT_PER_UNIT, DAMPING, TIRE_N_PER_M, TIRE_DAMPING, MOST_PULL_N = range(4, 12)
 # Of what rubs: its force, how it grows with the rate, and at which share of a step it looks at it; and whole numbers,
 # where its rate stands in the motion and at which suspension and tire it is recorded (-1: at none).
-FRICTION_N, FRICTION_MPS, FRICTION_AT = range(3)
+FRICTION_N, FRICTION_MPS, FRICTION_AT, STATIC_RATIO, STRIBECK_MPS = range(5)
 RATE_ROW, ON_SUSPENSION, ON_TIRE = range(3)
 # Whole numbers of a law: its address, wheel, what it acts on, where its numbers begin, and how many states it has.
 ADDRESS, WHEEL, BETWEEN, FIRST, STATES = range(5)
@@ -339,8 +339,14 @@ def _rub(
             for j in range(count):
                 if j != i:
                     free += by_force[2 * w + j, row] * forces[2 * w + j]
-            forces[2 * w + i] = _friction(free, -by_force[2 * w + i, row], rubs[i, FRICTION_N],
-                                          rubs[i, FRICTION_MPS] / rubs[i, FRICTION_AT])
+            ease, most, at = -by_force[2 * w + i, row], rubs[i, FRICTION_N], rubs[i, FRICTION_AT]
+            more, transition = most * (rubs[i, STATIC_RATIO] - 1.0), rubs[i, FRICTION_MPS] / at
+            force = _friction(free, ease, most + more, transition)
+            if more > 0.0:  # what is more at rest falls so little over the rate that a friction takes away in a step
+                for _ in range(_PASSES):
+                    slides = at * (free - ease * force) / rubs[i, STRIBECK_MPS]
+                    force = _friction(free, ease, most + more * np.exp(-slides * slides), transition)
+            forces[2 * w + i] = force
     for i in range(count):
         for r in range(m, len(motion)):
             motion[r] += by_force[2 * w + i, r] * forces[2 * w + i]

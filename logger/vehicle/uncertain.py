@@ -157,8 +157,8 @@ _MASS_KG, _BOUNCE_HZ, _WHEELBASE_M = 350.0, 1.4, 2.7
 _TRAVEL_M = 0.02
 # Powers of force, way and time by the end of a name, the longest ends first.
 _POWERS = {
-    "_n_per_m3": (1, -3, 0), "_n_s2_per_m2": (1, -2, 2), "_n_s_per_m": (1, -1, 1), "_n_per_m": (1, -1, 0),
-    "_m_per_s": (0, 1, -1), "_kg": (1, -1, 2), "_n": (1, 0, 0),
+    "_n_per_m3": (1, -3, 0), "_n_per_m2": (1, -2, 0), "_n_s2_per_m2": (1, -2, 2), "_n_s_per_m": (1, -1, 1),
+    "_n_per_m": (1, -1, 0), "_m_per_s": (0, 1, -1), "_kg": (1, -1, 2), "_n": (1, 0, 0),
 }
 _LENGTH = "_m"
 

@@ -40,8 +40,9 @@ def noise(highest_hz: float, size: float, seed: int) -> Course:
 @dataclass(frozen=True)
 class Bench:
     """A mass on a base [kg, N/m, N s/m], or two of them, on each other and on a tire; further forces by its travel, and
-    of the guide that it goes along, which stands on the ground: friction, grown over 1 mm/s, and drag; what an orifice
-    adds to the damper, by the square of its rate; and play of the spring, this way in each direction."""
+    of the guide that it goes along, which stands on the ground: friction, grown over 1 mm/s and so many times as large
+    at rest, of which excess 1 / e is left at 30 mm/s, and drag; what an orifice adds to the damper, by the square of
+    its rate; and play of the spring, this way in each direction."""
 
     mass: float = 0.3
     spring: float = 30.0
@@ -50,6 +51,7 @@ class Bench:
     wheel: float = 0.0
     tire: float = 0.0
     guide_n: float = 0.0
+    holds: float = 1.0
     guide_drag: float = 0.0
     orifice: float = 0.0
     play_m: float = 0.0
@@ -79,7 +81,8 @@ class Bench:
             force = force + self.orifice * rate_mps * abs(rate_mps)
             guide = self.guide_drag * body_mps
             if self.guide_n:
-                guide = guide + self.guide_n * np.tanh(body_mps / 0.001)
+                more = 1.0 + (self.holds - 1.0) * np.exp(-(body_mps / 0.03)**2)
+                guide = guide + self.guide_n * np.tanh(body_mps / 0.001) * more
             wheel = (force - self.tire * (wheel_m - ground_m) + on_wheel(t)) / self.wheel if self.wheel else 0.0
             return (on_body(t) - force - guide) / self.mass, wheel
 
@@ -433,6 +436,36 @@ def test_a_circuit_of_tiny_numbers_is_named_a_hardening_spring(tmp_path: Path, c
     assert found["verdict"] == ["progressive_spring"]
     best = next(one for one in found["candidates"] if one["effect"] == "progressive_spring")
     assert best["parameters"]["cubic_stiffness_n_per_m3"] == pytest.approx(30.0, rel=0.1)
+
+
+@pytest.mark.parametrize("holds", [1.6, *slow(1.0)])
+def test_how_much_more_friction_holds_than_it_rubs_is_found_where_it_does(holds: float, tmp_path: Path) -> None:
+    true = Bench(1.2, 900.0, 4.0, guide_n=0.8, holds=holds)
+    push = noise(12.0, 1.5, 6)
+    velocity_mps = true.moved(NOTHING, push, NOTHING)["velocity_mps"]
+    velocity_mps = velocity_mps + 0.0005 * np.random.default_rng(7).standard_normal(len(velocity_mps))
+    run = written(tmp_path / "run", {"velocity_mps": velocity_mps}, {"force_n": push(TIME_S)}, BODY)
+    (tmp_path / "bench.yaml").write_text(Bench(1.2, 880.0, 4.1).yaml)
+    found = ridelog.add_effect("dry_friction", tmp_path / "bench.yaml", [run])
+    assert found.parameters["friction_force_n"] == pytest.approx(0.8, rel=0.05)
+    assert found.parameters["static_to_sliding_ratio"] == pytest.approx(holds, rel=0.1 * (holds > 1))
+    assert found.parameters["stribeck_velocity_m_per_s"] == pytest.approx(0.03 if holds > 1 else 0.05, rel=0.2)
+    assert found.error_after < 0.02
+
+
+@pytest.mark.parametrize("quadratic", [-5e3, *slow(0.0)])
+def test_a_spring_that_is_stiffer_to_one_side_is_found_where_it_is(quadratic: float, tmp_path: Path) -> None:
+    """As an air spring is: of a part, by its equation alone."""
+    way = noise(3.0, 0.02, 6)
+    x_m = way(TIME_S)
+    force_n = 400.0 * x_m + 90.0 * way(TIME_S, 1) + quadratic * x_m**2 + 1e5 * x_m**3
+    force_n += np.random.default_rng(1).normal(0.0, 0.05, len(force_n))
+    run = written(tmp_path / "run", {"force_n": force_n}, {"displacement_m": x_m}, "source: me\n")
+    (tmp_path / "part.yaml").write_text(
+        "name: spring\nmodel: component\nstiffness_n_per_m: 360\ndamping_n_s_per_m: unknown\n")
+    found = ridelog.add_effect("progressive_spring", tmp_path / "part.yaml", [run])
+    assert found.parameters["cubic_stiffness_n_per_m3"] == pytest.approx(1e5, rel=0.02)
+    assert found.parameters["quadratic_stiffness_n_per_m2"] == pytest.approx(quadratic, rel=0.02, abs=1e-6)
 
 
 def test_the_zero_of_the_force_on_a_hardening_spring_is_found(

@@ -83,7 +83,9 @@ def test_those_of_the_format_are_there() -> None:
     assert list(EFFECTS) == sorted(name for name in files if not name.startswith("_"))
     parameters = {name: [one.name for one in effect.parameters] for name, effect in EFFECTS.items()}
     assert parameters["wheel_lift"] == []
-    assert parameters["dry_friction"] == ["friction_force_n", "transition_velocity_m_per_s", "axle"]
+    assert parameters["dry_friction"] == [
+        "friction_force_n", "transition_velocity_m_per_s", "static_to_sliding_ratio", "stribeck_velocity_m_per_s",
+        "axle"]
     assert parameters["body_bending"] == ["frequency_hz", "damping_ratio", "participation", "ends_move"]
     assert parameters["sensor_bandwidth"] == ["cutoff_hz", "order", "sampled_hz"]
 
@@ -106,8 +108,12 @@ def test_a_contact_patch_as_it_was_changes_nothing() -> None:
     one if one[1] == "half" else pytest.param(*one, marks=pytest.mark.slow) for one in WHERE])
 def test_it_is_finite_over_its_bounds_and_there(name: str, model: str) -> None:
     effect, plain, most = EFFECTS[name], record(CARS[model]), 0.0
-    corners = product(*({one.low, one.start, one.high} if not one.choices else one.choices
-                        for one in effect.parameters))
+    ends = [one.choices or (one.low, one.start, one.high) for one in effect.parameters]
+    # No spring softens in two ways at once.
+    of_plain = [one.name not in effect.refinements for one in effect.parameters]
+    corners = [values for side in (True, False) for values in product(*(
+        some if plain is side else (effect.usual[one.name] if one.default is not None else one.start,)
+        for one, some, plain in zip(effect.parameters, ends, of_plain, strict=True)))]
     for values in corners:
         found = record(CARS[model], chosen(effect, dict(zip([one.name for one in effect.parameters], values,
                                                             strict=True))))

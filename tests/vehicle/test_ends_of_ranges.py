@@ -20,7 +20,9 @@ def test_a_shape_at_the_end_of_its_range_is_no_effect() -> None:
     shapes = {one.name: one.high for one in roll.parameters}
     bandwidth = EFFECTS["sensor_bandwidth"]
     assert chosen(bandwidth, {"cutoff_hz": 2000.0, "order": 2.0}).at_bound  # where it does nothing
-    assert not chosen(bandwidth, {"cutoff_hz": 0.5, "order": 2.0}).at_bound
+    assert not chosen(bandwidth, {"cutoff_hz": 0.6, "order": 2.0}).at_bound
+    assert chosen(bandwidth, {"cutoff_hz": 0.5, "order": 2.0}).at_bound  # nothing of it was measured
+    assert [chosen(EFFECTS["play"], {"half_gap_m": gap_m}).at_bound for gap_m in (0.019, 0.02)] == [False, True]
     assert not chosen(roll, shapes).at_bound  # it has no strength that could make up for a shape
 
 

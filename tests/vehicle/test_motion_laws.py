@@ -92,16 +92,21 @@ def plain() -> np.ndarray:
     return by_newton(lambda *_: (0.0, 0.0, []))[:, :4]
 
 
-@pytest.mark.parametrize(("wheel_n", "body_n"), [(30.0, 0.0), (0.0, 25.0), (30.0, 25.0)])
-def test_guides_rub_as_newton_says(wheel_n: float, body_n: float, plain: np.ndarray) -> None:
-    """Friction that grows within 0.5 mm/s nearly at once, in an integrator that takes all the steps it needs."""
+@pytest.mark.parametrize(("wheel_n", "body_n", "ratio"), [
+    (30.0, 0.0, 1.0), (0.0, 25.0, 1.0), (30.0, 25.0, 1.0), (30.0, 25.0, 1.8)])
+def test_guides_rub_as_newton_says(wheel_n: float, body_n: float, ratio: float, plain: np.ndarray) -> None:
+    """Friction that grows within 0.5 mm/s nearly at once, in an integrator that takes all the steps it needs; and with
+    more of it at rest, of which 1 / e is left at 50 mm/s."""
+    def rubs(mps):
+        return np.tanh(mps / 5e-4) * (1.0 + (ratio - 1.0) * np.exp(-(mps / 0.05)**2))
+
     def added(t, x, v, d, d_mps, u_mps, z):
-        return body_n * np.tanh((v + u_mps) / 5e-4), wheel_n * np.tanh(u_mps / 5e-4), []
+        return body_n * rubs(v + u_mps), wheel_n * rubs(u_mps), []
 
     expected = by_newton(added)[:, :4]
     for transition, allowed in ((5e-4, 0.01), (0.0, 0.03)):
         states, _ = stepped(effect("frame_friction", friction_force_n=wheel_n, body_friction_force_n=body_n,
-                                   transition_velocity_m_per_s=transition))
+                                   transition_velocity_m_per_s=transition, static_to_sliding_ratio=ratio))
         assert off(states, expected, plain) < allowed
 
 
@@ -126,14 +131,16 @@ def test_a_rig_comes_to_rest_and_stays() -> None:
     assert abs(states[-1, 0] - states[-1, 1]) * 20000.0 < 100.0 + 1.0
 
 
-@pytest.mark.parametrize(("travel_m", "sharpness"), [(0.0003, 1.0), (0.002, 1.0), (0.004, 2.0), (0.001, 0.7)])
-def test_hysteresis_moves_as_newton_says(travel_m: float, sharpness: float, plain: np.ndarray) -> None:
+@pytest.mark.parametrize(("travel_m", "sharpness", "reversal"), [
+    (0.0003, 1.0, 1.0), (0.002, 1.0, 1.0), (0.004, 2.0, 1.0), (0.001, 0.7, 1.0), (0.002, 1.0, 2.0)])
+def test_hysteresis_moves_as_newton_says(travel_m: float, sharpness: float, reversal: float, plain: np.ndarray) -> None:
     def added(t, x, v, d, d_mps, u_mps, z):
-        grow = v / travel_m * (1 - abs(z[0]) ** sharpness * (1.0 if v * z[0] > 0 else 0.0))
+        grow = v / travel_m * (1 - abs(z[0]) ** sharpness * (1.0 if v * z[0] > 0 else 1.0 - reversal))
         return 120 * z[0], -120 * z[0], [grow]
 
     expected = by_newton(added, 1)[:, :4]
-    states, _ = stepped(effect("hysteresis", yield_force_n=120.0, yield_travel_m=travel_m, sharpness_ratio=sharpness))
+    states, _ = stepped(effect("hysteresis", yield_force_n=120.0, yield_travel_m=travel_m, sharpness_ratio=sharpness,
+                               reversal_ratio=reversal))
     assert off(states, expected, plain) < 0.01
 
 
@@ -167,7 +174,7 @@ def test_the_loop_is_as_large_as_it_has_to_be() -> None:
     then as 1 - exp(-x / y), so half a turn of 2 a takes (2 a - (1/2 + 1 + 1) y) F. Within it each half way begins at
     -z1, and comes straight to 0, then curved to z1: the area is known from z1 alone."""
     force_n, y = 120.0, 0.002
-    values = SimpleNamespace(yield_force_n=force_n, yield_travel_m=y, sharpness_ratio=1.0)
+    values = SimpleNamespace(yield_force_n=force_n, yield_travel_m=y, sharpness_ratio=1.0, reversal_ratio=1.0)
     large = 2 * force_n * (2 * 0.05 - 2.5 * y)
     assert loop_area_n_m(0.05, values) == pytest.approx(large, rel=1e-3)
     for small in (0.001, 0.003):
@@ -181,10 +188,9 @@ def test_the_loop_is_as_large_as_it_has_to_be() -> None:
 
 def test_no_friction_gives_energy() -> None:
     """Over any closed way the work of the force, less what is stored in its first stiffness, is a loss."""
-    values = SimpleNamespace(yield_force_n=1.0, yield_travel_m=1.0, sharpness_ratio=1.0)
+    values = SimpleNamespace(yield_force_n=1.0, yield_travel_m=1.0, sharpness_ratio=1.0, reversal_ratio=1.0)
     x = np.cumsum(np.random.default_rng(3).standard_normal(20000)) * 0.03
-    for sharpness in (0.5, 1.0, 4.0):
-        values.sharpness_ratio = sharpness
+    for values.sharpness_ratio, values.reversal_ratio in ((0.5, 1.0), (1.0, 1.0), (4.0, 1.0), (1.0, 2.0)):
         z, lost = 0.0, [0.0]
         for step in np.diff(x):
             parts = max(1, int(abs(step) / 0.01))
@@ -263,7 +269,7 @@ def test_two_states_are_stepped_with_the_car(tmp_path: Path, plain: np.ndarray) 
 
 
 def test_a_compiled_law_answers_as_it_is_written() -> None:
-    values = SimpleNamespace(yield_force_n=7.0, yield_travel_m=0.5, sharpness_ratio=1.5)
+    values = SimpleNamespace(yield_force_n=7.0, yield_travel_m=0.5, sharpness_ratio=1.5, reversal_ratio=1.0)
     law = MotionLaw(Between.BODY_AND_WHEEL, force, values, rates, (0.0,))
     felt = np.linspace(-0.4, 0.6, stepping_loop.FELT)
     seen = Seen(*felt[: stepping_loop.MEMORY_AT], (felt[stepping_loop.MEMORY_AT],))

@@ -26,13 +26,11 @@ from logger.api.vehicles import model_of
 from logger.arrays import Array
 from logger.errors import BadInput
 from logger.lab.compare import LabComparison, compare
-from logger.lab.diagnosis import LabDiagnosis, diagnose, refit
-from logger.lab.likelihood.posterior import Posterior
+from logger.lab.diagnosis import LabDiagnosis, begin_search, diagnose
+from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.record_band import with_pass_bands
 from logger.lab.selection.add_effect import AddedEffects, add
-from logger.lab.selection.candidate_fit import fit_roughly, refine
-from logger.lab.selection.screening import misalignment, screen
 from logger.profiles.excitation import Excitation
 from logger.question import TOLERANCE, UNKNOWN, Notify, WrongOption, silent
 from logger.runs import Run, are_on_rig
@@ -154,32 +152,31 @@ class Bench:
         return replace(self, effects={**self.effects, effect.name: effect},
                        files={**self.files, effect.name: file} if file is not None else self.files)
 
-    def search_values(self, effect: Effect, values: Mapping[str, float], notify: Notify = silent) -> Chosen:
-        """Where the fit of an effect begins: at these values, and for the rest where a search for it alone ends."""
+    def search_values(self, effect: Effect, values: Mapping[str, float], notify: Notify = silent
+                      ) -> tuple[Chosen, State | None]:
+        """Where the fit of an effect begins: at these values, and for the rest where a search for it alone ends, with
+        its car; None where nothing is left to be searched."""
         if set(values) >= {one.name for one in effect.parameters}:
-            return chosen(effect, values)
+            return chosen(effect, values), None
         with self.blamed():
-            posterior = self.posterior(searches=True)
-            notify("refitting the model's parameters")
-            nominal = posterior.start(self.model.effects)
-            seen = misalignment(posterior, nominal)
-            base = refit(posterior, nominal)
+            search, base = begin_search(self.posterior(searches=True), {effect.name: effect}, self.model.effects,
+                                        notify)
             notify(f"searching for {effect.name}")
-            tries = fit_roughly(base.score, base, screen(base, effect, [seen]))
-        choices = {one.name for one in effect.parameters if one.choices} & set(values)
-        said = [one for one in tries if all(one.chosen.values[name] == values[name] for name in choices)]
-        best = max((refine(base.score, one) for one in said or tries), key=lambda one: one.gain)
-        return chosen(effect, {**best.chosen.values, **values})
+            best = search.best_of(effect, base, {one.name: values[one.name] for one in effect.parameters
+                                                 if one.choices and one.name in values})
+        return chosen(effect, {**best.chosen.values, **values}), best.found.state
 
     def beside(self, starts: Sequence[Chosen]) -> Bench:
         """The same with effects in the model that are about to be added."""
         return replace(self, model=replace(self.model, effects=(*self.model.effects, *starts)))
 
-    def added(self, starts: Sequence[Chosen], candidates: int, notify: Notify = silent) -> AddedEffects:
-        """The effects fitted with the car's numbers on all of the runs, from the best of so many ``candidates``."""
+    def added(self, starts: Sequence[Chosen], candidates: int, notify: Notify = silent, near: State | None = None
+              ) -> AddedEffects:
+        """The effects fitted with the car's numbers on all of the runs, from the best of so many ``candidates``;
+        ``near``: where a search for them ended."""
         notify(f"fitting the model without and with {' and '.join(one.effect.name for one in starts)}")
         with self.blamed():
-            return add(self.posterior(), self.model.effects, list(map(self.filed, starts)), candidates)
+            return add(self.posterior(), self.model.effects, list(map(self.filed, starts)), candidates, near)
 
     def model_with(self, found: AddedEffects) -> CarModel:
         """The model with what was added, and how it came to it. BadInput for one that could not be read back, because a

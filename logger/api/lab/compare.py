@@ -140,12 +140,13 @@ class AddedEffect(CommandResult):
 
 def added(question: AddEffectQuestion) -> AddedEffect:
     """The answer to ``AddEffectQuestion``, which says what is raised."""
-    bench, starts, candidates = bench_with(question), list[Chosen](), 1
+    bench, starts, candidates, near = bench_with(question), list[Chosen](), 1, None
     for effect, file, values in _all_asked_for(bench, question):
         bench = bench.with_effect(effect, file)
         candidates *= 1 if set(values) >= {one.name for one in effect.parameters} else len(effect.trials())
-        starts.append(bench.beside(starts).search_values(effect, values, question.progress))
-    found = bench.added(starts, candidates, question.progress)
+        begin, near = bench.beside(starts).search_values(effect, values, question.progress)
+        starts.append(begin)
+    found = bench.added(starts, candidates, question.progress, near)
     return addition_of(found, model_of(bench.model_with(found)))
 
 
@@ -585,7 +586,6 @@ def worst_moment(standing: Standing) -> Moment:
     return Moment(index, slice(max(0, middle - reach), middle + reach), f"{names[run.name]}, around {where}")
 
 
-_AT_BOUND = 1e-6
 _NAMED = 4
 
 
@@ -612,8 +612,7 @@ def judgement(found: AddedEffects) -> list[str]:
                      "what ridelog diagnose finds together.")
     for one in found.new:
         at = [parameter.name for parameter in one.effect.parameters if parameter.is_free
-              and min(abs(one.values[parameter.name] - end) for end in (parameter.low, parameter.high)
-                      if end != parameter.default) <= _AT_BOUND * abs(parameter.high)]
+              and one.values[parameter.name] != parameter.default and parameter.at_bound(one.values[parameter.name])]
         if at:
             lines.append(f"At its bound: {', '.join(at)}. The bound stopped the fit there; it is not a measured value.")
     if found.helps:

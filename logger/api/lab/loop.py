@@ -33,6 +33,7 @@ from logger.errors import BadInput
 from logger.estimation.batch import Assessment, figures
 from logger.files import make_folder, write_text
 from logger.lab import compare, diagnosis
+from logger.lab.likelihood.posterior import State
 from logger.lab.residuals.breakdown import ModelResiduals, frequencies
 from logger.lab.selection.add_effect import AddedEffects
 from logger.lab.selection.holdout import JUDGED_ON
@@ -54,6 +55,7 @@ Ask = Callable[[Bench, str], str | None]
 """Which effect to add where one was found missing: its name or another's, or None for none."""
 Learns = Callable[[], bool]
 """Whether a law is to be learned where no effect explains what is missing."""
+_Begin = tuple[Chosen, State | None]
 Progress = Callable[[], AbstractContextManager[Notify]]
 Explain = Callable[[str, str, str], str]
 """What to say under a heading, laid out: of compare, diagnose, learn, add, again or end; with the effect that is
@@ -204,7 +206,8 @@ def go_through(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progres
                 refused.append(one.effect.name)
                 continue
             same = wanted == one.effect.name
-            step, made_now = step.added(wanted, one if same else None, len(rounds) + 1)
+            begin = (one, diagnoses[-1].state) if same else None
+            step, made_now = step.added(wanted, begin, len(rounds) + 1)
             rounds.append(made_now)
             word = made_now.file
             if not same:  # with another effect, what is missing is searched again
@@ -223,13 +226,13 @@ class _Step:
     progress: Progress
     explain: Explain
 
-    def added(self, name: str, start: Chosen | None, number: int) -> tuple[_Step, Round]:
+    def added(self, name: str, start: _Begin | None, number: int) -> tuple[_Step, Round]:
         """An effect added: from where a diagnosis found it, or from where a search for it ends (None)."""
         file = _vehicle_file(self.out, number)
         self.notify(chapter(f"Add {name}", self.explain("add", name, str(file))))
-        begin = start or _searched(self.given, name, self.progress)
+        begin, near = start or _searched(self.given, name, self.progress)
         with self.progress() as notify:
-            addition = self.given.added([begin], len(begin.effect.trials()), notify)
+            addition = self.given.added([begin], len(begin.effect.trials()), notify, near)
         return self._with(addition, name, file)
 
     def learned(self) -> tuple[_Step, LawSearch, list[Round]]:
@@ -266,7 +269,7 @@ def _vehicle_file(out: Path, number: int) -> Path:
     return out / f"vehicle-{number}.yaml"
 
 
-def _searched(given: Bench, name: str, progress: Progress) -> Chosen:
+def _searched(given: Bench, name: str, progress: Progress) -> _Begin:
     with progress() as notify:
         return given.search_values(given.effects[name], {}, notify)
 

@@ -59,8 +59,7 @@ def _loops(draft: Draft, found: Chosen, context: LawContext) -> Curves | None:
     for way_m in sorted({context.reach("travel_m", share) for share in _LOOP_SHARES}):
         phase = 2 * np.pi * np.linspace(0, _LOOP_TURNS, _LOOP_TURNS * _LOOP_STEPS + 1)
         travel, rate = way_m * np.sin(phase), way_m * 2 * np.pi * _LOOP_HZ * np.cos(phase)
-        force = sum((one(travel, rate) for one in laws.others), np.zeros_like(travel))
-        force = force + laws.dry_friction_n * np.sign(rate)
+        force = sum((one(travel, rate) for one in laws.others), laws.friction_n(rate))
         for law in laws.motions:
             memory, step_s = np.array(law.memory, dtype=float), 1 / _LOOP_HZ / _LOOP_STEPS
             still = np.zeros(len(Seen._fields) - 3)

@@ -83,8 +83,12 @@ class Posterior:
 
     def simulated_finely(self) -> Posterior:
         """The posterior with runs simulated as finely as what is reported."""
-        return Posterior(SimulatedRuns(self.runs.runs, steps_hz(self.vehicle)), self.vehicle, self.tolerance,
-                         self.start_vehicle, self.prior, self.readings)
+        return self.simulated(steps_hz(self.vehicle))
+
+    def simulated(self, fine_hz: float) -> Posterior:
+        """The posterior with runs simulated in so many steps a second."""
+        return Posterior(SimulatedRuns(self.runs.runs, fine_hz), self.vehicle, self.tolerance, self.start_vehicle,
+                         self.prior, self.readings)
 
     def with_free_gains(self) -> Posterior:
         """The posterior with the gains free that fits hold; itself where none is held."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import prod
 
@@ -13,7 +13,12 @@ from logger.lab.likelihood.by_squares import BySquares
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import MapFit, fit, fit_to_the_end, optimise_numbers, relinearise
 from logger.lab.likelihood.posterior import NotSimulated, State
-from logger.lab.selection.evidence import min_gain, probability_by_chance, probability_of_likelihood_gain
+from logger.lab.selection.evidence import (
+    INDISTINGUISHABLE,
+    min_gain,
+    probability_by_chance,
+    probability_of_likelihood_gain,
+)
 from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.lab.selection.screening import Baseline, Screened, Trial
 from logger.vehicle.effect import AXLE, Chosen, Effect
@@ -88,6 +93,21 @@ def fit_roughly(score: float, base: Baseline, screen: Screened, least: float = -
 def refine(score: float, one: CandidateFit, worth: float = 0.0, rounds: int = 3) -> CandidateFit:
     """Fit a candidate again with derivatives of its own."""
     return CandidateFit.of(score, fit(one.found.linearise(), one.found.numbers, rounds, worth))
+
+
+def with_refinements(score: float, one: CandidateFit) -> CandidateFit:
+    """The fit of an effect in its plain form, or one with its refinements that begins there, if that is so much better
+    that it can be distinguished."""
+    posterior, state, numbers = one.found.posterior, one.found.state, one.found.numbers
+    names = one.effect.refinements if one.chosen.is_plain else ()
+    refined = [replace(one.chosen, values={**one.chosen.values, **{name: values[name] for name in names}})
+               for values in one.effect.trials() if names]
+    begun = [LinearModel(posterior, posterior.state_at((*state.effects[:-1], there), state.logs, state.record,
+                                                       state.size), numbers) for there in refined if not there.is_plain]
+    if not begun:
+        return one
+    found = CandidateFit.of(score, fit(min(begun, key=lambda each: each.score), numbers))
+    return found if found.gain > one.gain + INDISTINGUISHABLE else one
 
 
 def refine_to_the_end(score: float, one: CandidateFit) -> CandidateFit:

@@ -206,8 +206,8 @@ def screen(base: Baseline, effect: Effect, misaligned: Sequence[Misalignment],
     shape = next((one.name for one in effect.parameters if one.is_free and one.null is None), "")
 
     def try_out(values: dict[str, float]) -> None:
-        choice = tuple(values[parameter.name] for parameter in effect.parameters if not parameter.is_free)
         one = chosen(effect, values)
+        choice = (*(values[parameter.name] for parameter in effect.parameters if not parameter.is_free), one.is_plain)
         ways = [_trial_at_values(base, one) if effect.replaces else _trial_at_best_strength(base, one)]
         if realigns and values is not trials[0]:
             ways.append(_realigned_trial(base, one, ways[0]))

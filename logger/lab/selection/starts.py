@@ -20,13 +20,14 @@ import numpy as np
 
 from logger.lab.likelihood.by_squares import BySquares
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import align, fit
+from logger.lab.likelihood.map_fit import align, fit, fit_model
 from logger.lab.likelihood.posterior import NotSimulated, Posterior, State
 from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly
 from logger.lab.selection.evidence import INDISTINGUISHABLE
 from logger.lab.selection.screening import Baseline, Screened, effects_without
 from logger.lab.selection.stepwise import MeasuredRoad, Progress
+from logger.simulation.virtual_drive import SEARCH_HZ
 from logger.vehicle.effect import Chosen, Effect, Misalignment, chosen
 from logger.vehicle.named_parameters import WEAKEST
 
@@ -110,17 +111,21 @@ class UnknownNumbers(MeasuredRoad):
         """It is the fitted one."""
 
     def fitted_roughly(self, score: float, base: Baseline, one: Screened, least: float) -> list[CandidateFit]:
-        """Fits from the best trial on the model, and from the best of the cars that were drawn."""
+        """Fits from the best trial on the model, and from the best of the cars that were drawn: of the effect in its
+        plain form, and with its refinements."""
         if not isinstance(one, Started):
             return fit_roughly(score, base, one, least)
-        found = fit_roughly(score, base, replace(one, trials=one.trials[:1]))
         by_squares = self._by_squares(base.posterior)
         ends = sorted([*one.ends, *_improved(by_squares, one.others, 12)], key=_by_deviance)
-        least, best = ends[0]
-        self.ends[one.effect.name] = sum(deviance < least + INDISTINGUISHABLE for deviance, _ in ends), len(ends)
-        found.append(CandidateFit.of(score, self._likeliest(
-            by_squares.of_all(best, base.state), base.posterior)))
-        return sorted(found, key=lambda one: -one.gain)
+        trials = {trial.one.is_plain: trial for trial in reversed(one.trials)}
+        best = {state.effects[-1].is_plain: state for _, state in reversed(ends)}
+        found = fit_roughly(score, base, replace(one, trials=tuple(trials.values())))
+        found += [CandidateFit.of(score, self._likeliest(by_squares.of_all(state, base.state), base.posterior))
+                  for state in best.values()]
+        found.sort(key=lambda one: -one.gain)
+        alike = [deviance for deviance, state in ends if state.effects[-1].is_plain == found[0].chosen.is_plain]
+        self.ends[one.effect.name] = sum(each < alike[0] + INDISTINGUISHABLE for each in alike), len(alike)
+        return found
 
     def without(self, now: Baseline, name: str) -> Baseline:
         """The model without an effect, fitted from where it is and from several starts."""
@@ -153,25 +158,37 @@ class UnknownNumbers(MeasuredRoad):
         begun += _improved(by_squares, [one for some in drawn for one in some[:count]], 12)
         return min(begun, key=_by_deviance)[1]
 
-    def _cars(self, by_squares: BySquares, effect: Effect | None, near: State) -> tuple[list[_Drawn], list[_Drawn]]:
-        """The best of cars that were drawn around the file's, and as many of those around a state, the best first. A
-        state without the effect is in a valley of its own, whose cars are the better ones before they are improved."""
+    def _cars(self, by_squares: BySquares, effect: Effect | None, near: State) -> list[list[_Drawn]]:
+        """The best of cars that were drawn around the file's, and as many of those around a state, the best first; of
+        the effect in its plain form, and as many with its refinements. A state without the effect is in a valley of its
+        own, whose cars are the better ones before they are improved."""
         prior = by_squares.posterior.prior
         rng = np.random.default_rng(crc32((effect.name if effect else "").encode()))
-        trials = effect.trials() if effect else [{}]
-        drawn: tuple[list[Any], list[Any]] = [], []
+        trials = [chosen(effect, values) for values in effect.trials()] if effect else []
+        forms = [some for plain in (True, False) if (some := [one for one in trials if one.is_plain is plain])]
+        drawn: list[list[Any]] = [[] for _ in range(2 * max(len(forms), 1))]
         for number in range(self.draws):
             logs = near.logs * (number % 2)
             if number > 1:
                 logs = logs + np.minimum(prior.deviations, WEAKEST) * rng.standard_normal(len(logs))
             effects = [_drawn(one, rng, WEAKEST) for one in near.effects]
-            if effect is not None:
+            pair, kind = divmod(number, len(drawn))
+            if forms:
+                some = forms[kind // 2]
                 # Usual sizes follow the vehicle's by powers of ten (``sized``).
-                effects.append(_drawn(chosen(effect, trials[number // 2 % len(trials)]), rng, float(np.log(10.0)) / 2))
-            drawn[number % 2].append((by_squares.rank(effects, logs, near), effects, logs))
-        first, second = ([state for _, having, there in sorted(some, key=_by_deviance)[: self.starts]
-                          if (state := by_squares.at(having, there, near)) is not None] for some in drawn)
-        return first, second
+                effects.append(_drawn(some[pair % len(some)], rng, float(np.log(10.0)) / 2))
+            drawn[kind].append((by_squares.rank(effects, logs, near), effects, logs))
+        return [[state for _, having, there in sorted(some, key=_by_deviance)[: self.starts]
+                 if (state := by_squares.at(having, there, near)) is not None] for some in drawn]
+
+
+def fitted_from_starts(posterior: Posterior, present: Sequence[Chosen]) -> LinearModel:
+    """The model with some effects, fitted; where the car's numbers are not known, from where a search's starts end."""
+    if not posterior.prior.is_vague:
+        return fit_model(posterior, posterior.start(present))
+    found = UnknownNumbers().fitted(posterior.simulated(SEARCH_HZ), present).linear
+    state = found.state
+    return fit_model(posterior, posterior.state_at(state.effects, state.logs, state.record, state.size), found.numbers)
 
 
 def _improved(by_squares: BySquares, drawn: Sequence[_Drawn], rounds: int) -> list[_Drawn]:
@@ -190,8 +207,8 @@ def _by_deviance(one: tuple[float, *tuple[Any, ...]]) -> float:
 def _drawn(one: Chosen, rng: np.random.Generator, spread: float) -> Chosen:
     """An effect with its sizes drawn around those that it has, by a standard deviation of their logarithms."""
     values: dict[str, Any] = dict(one.values)
-    for parameter in one.effect.parameters:
-        if parameter.is_free and values[parameter.name]:
+    for parameter in one.freed:
+        if values[parameter.name]:
             value = values[parameter.name] * float(np.exp(spread * rng.standard_normal()))
             values[parameter.name] = min(max(value, parameter.low), parameter.high)
     return replace(one, values=values)

@@ -8,7 +8,7 @@ whatever gains most in its place is kept, or nothing. The next round begins with
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -20,7 +20,7 @@ from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit, fit_to_the_end
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.residuals.noise_colour import is_coloured_noise
-from logger.lab.selection.candidate_fit import CandidateFit, chance_of, fit_roughly, refine
+from logger.lab.selection.candidate_fit import CandidateFit, chance_of, fit_roughly, refine, with_refinements
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION, INDISTINGUISHABLE, min_gain, probability_by_chance
 from logger.lab.selection.holdout import HoldOut
 from logger.lab.selection.screening import (
@@ -194,11 +194,12 @@ class MeasuredRoad:
 
     def refined(self, base: Baseline, one: CandidateFit, least: float) -> CandidateFit:
         """The fit with derivatives of its own."""
-        return refine(base.score, one, least)
+        return with_refinements(base.score, refine(base.score, one, least))
 
     def with_effect(self, one: CandidateFit) -> Baseline:
         """The model with the effect, its runs aligned again."""
-        return Baseline.of(fit(align(one.found.posterior, one.found.state), one.found.numbers))
+        found = with_refinements(one.found.score, one).found
+        return Baseline.of(fit(align(found.posterior, found.state), found.numbers))
 
     def chance(self, one: Chosen, gain: float, base: Baseline, candidates: int) -> float:
         """By the evidence and by the likelihood."""
@@ -277,6 +278,14 @@ class Search(Generic[M, P, F]):
         """A search of its own for up to so many effects, on models in which so many more are given."""
         return Search(self.effects, self.present + more, self.misalignment, self.progress, self.workers,
                       replace(self.effort, effects=effects), self.likelihood)
+
+    def best_of(self, effect: Effect, base: M, values: Mapping[str, float]) -> F:
+        """The best fit of one effect on a model, with these of its choices, whatever it gains."""
+        with ThreadPoolExecutor(self.workers) as pool:
+            one = self._screen_all(pool, base, [effect])[0]
+        tries = self.likelihood.fitted_roughly(base.score, base, one, -np.inf)
+        said = [each for each in tries if all(each.chosen.values[name] == value for name, value in values.items())]
+        return _best_of_each([self.likelihood.refined(base, each, 0.0) for each in said or tries])[0]
 
     def run(self, before: M) -> Selection[M, P, F]:
         """Search on top of a fitted model."""
@@ -582,8 +591,10 @@ def _gains_enough(one: Promise | Fitted, enough: float) -> bool:
 
 
 def _best_of_each(fits: Sequence[F]) -> list[F]:
-    """The best fit of each effect, best first: in both axles, where one of them alone cannot be distinguished."""
+    """The best fit of each effect, best first: in both axles, and in its plain form, where one of them alone, or its
+    refinements, cannot be distinguished."""
     found: dict[str, F] = {}
-    for one in sorted(fits, key=lambda one: -one.gain - INDISTINGUISHABLE * (not one.chosen.where)):
+    for one in sorted(fits, key=lambda one: -one.gain - INDISTINGUISHABLE * (
+            (not one.chosen.where) + one.chosen.is_plain)):
         found.setdefault(one.effect.name, one)
     return sorted(found.values(), key=lambda one: -one.gain)

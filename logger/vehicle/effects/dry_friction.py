@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Values
-from logger.vehicle.laws import CornerLaws
+from logger.vehicle.effect import AXLE, STATIC_RATIO, STRIBECK_VELOCITY, ForceEffect, Parameter, Scale, Values
+from logger.vehicle.laws import CornerLaws, Stribeck
 
 
 class DryFriction(ForceEffect):
@@ -20,17 +20,21 @@ class DryFriction(ForceEffect):
         Parameter("transition_velocity_m_per_s", 0.02, 0.0, 0.2, None, Scale.LINEAR, (0.0, 0.003, 0.02),
                   "rate at which the friction has grown to tanh(1) of its force; 0: at once", default=0.0,
                   step=0.0003),
+        STATIC_RATIO, STRIBECK_VELOCITY,
         AXLE,
     )
     source = "M. Mitschke, H. Wallentowitz, Dynamik der Kraftfahrzeuge (2014), chapter on suspension friction"
     signature = "on smooth stretches the springs lock and the body rides on its tires; rough ones change little"
     shown_by = "drive a smooth road slowly, so that the suspension hardly moves"
 
+    refinements = (STATIC_RATIO.name, STRIBECK_VELOCITY.name)
+
     def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
         if p.friction_force_n == 0:
             return laws
         return replace(laws, dry_friction_n=laws.dry_friction_n + p.friction_force_n,
-                       friction_transition_mps=p.transition_velocity_m_per_s)
+                       friction_transition_mps=p.transition_velocity_m_per_s,
+                       stribeck=Stribeck(p.static_to_sliding_ratio, p.stribeck_velocity_m_per_s))
 
 
 EFFECT = DryFriction()

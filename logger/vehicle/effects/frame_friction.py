@@ -14,8 +14,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from logger.vehicle.effect import ForceEffect, Parameter, Scale, Sought, Values
-from logger.vehicle.laws import CornerLaws
+from logger.vehicle.effect import STATIC_RATIO, STRIBECK_VELOCITY, ForceEffect, Parameter, Scale, Sought, Values
+from logger.vehicle.laws import CornerLaws, Stribeck
 
 
 class FrameFriction(ForceEffect):
@@ -28,12 +28,14 @@ class FrameFriction(ForceEffect):
         Parameter("transition_velocity_m_per_s", 0.02, 0.0, 0.2, None, Scale.LINEAR, (0.0, 0.003, 0.02),
                   "speed at which the friction has grown to tanh(1) of its force; 0: at once", default=0.0,
                   step=0.0003),
+        STATIC_RATIO, STRIBECK_VELOCITY,
     )
     against_ground = True
     source = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083: friction in guides"
     signature = "small motions of wheel and body die away at once, even when the suspension does not move"
     shown_by = "shake the rig with small amplitudes, slowly, so that wheel and body hardly move"
     sought = Sought.ON_RIGS
+    refinements = (STATIC_RATIO.name, STRIBECK_VELOCITY.name)
     also_by: tuple[str, ...] = ("body_friction_force_n",)
 
     def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
@@ -41,7 +43,8 @@ class FrameFriction(ForceEffect):
             return laws
         return replace(laws, wheel_friction_n=laws.wheel_friction_n + p.friction_force_n,
                        body_friction_n=laws.body_friction_n + p.body_friction_force_n,
-                       guide_transition_mps=p.transition_velocity_m_per_s)
+                       guide_transition_mps=p.transition_velocity_m_per_s,
+                       guide_stribeck=Stribeck(p.static_to_sliding_ratio, p.stribeck_velocity_m_per_s))
 
 
 class _OfMass(FrameFriction):
@@ -52,8 +55,8 @@ class _OfMass(FrameFriction):
     also_by = ()
 
     def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
-        return super().laws(Values(friction_force_n=0.0, body_friction_force_n=p.friction_force_n,
-                                            transition_velocity_m_per_s=p.transition_velocity_m_per_s), laws)
+        return super().laws(Values(**{**vars(p), "friction_force_n": 0.0,
+                                      "body_friction_force_n": p.friction_force_n}), laws)
 
 
 EFFECT = FrameFriction()

@@ -3,10 +3,11 @@
 The force F z in each suspension has a memory z, from -1 to 1. With y the travel in which it would yield at its first
 stiffness F / y, and n the sharpness of the yield,
 
-    z' = (x' / y) (1 - |z|^n (1 + sign(x' z)) / 2)
+    z' = (x' / y) (1 - |z|^n (1 - r / 2 + r / 2 sign(x' z)))
 
-which is the law of Bouc and Wen with A = 1 and equal shares of both its shapes: it is let go along its first stiffness,
-and after a long way it is Coulomb friction. Without a yield travel it is ``dry_friction`` from the beginning.
+which is the law of Bouc and Wen with A = 1, beta = r / 2 and gamma = 1 - beta: where it is let go its stiffness is r
+times its first one, and after a long way it is Coulomb friction. In its plain form n and r are 1; with r = 2 it is the
+law of Dahl. Without a yield travel it is ``dry_friction`` from the beginning.
 
 A search tries it first of a part alone on its bench, as rubber does that; of a car, where it makes a search half as
 long again, when all others leave something unexplained.
@@ -30,7 +31,8 @@ def force(p: Any, seen: Seen) -> Any:
 def rates(p: Any, seen: Seen) -> tuple[Any]:
     """How fast the memory grows [1/s]."""
     z = seen.memory[0]
-    held = 0.5 * np.abs(z) ** p.sharpness_ratio * (1.0 + np.sign(seen.rate_mps * z))
+    shape = 0.5 * p.reversal_ratio
+    held = np.abs(z) ** p.sharpness_ratio * (1.0 - shape + shape * np.sign(seen.rate_mps * z))
     return (seen.rate_mps / p.yield_travel_m * (1.0 - held),)
 
 
@@ -41,8 +43,10 @@ class Hysteresis(ForceEffect):
                   "at which each suspension slides"),
         Parameter("yield_travel_m", 0.002, 0.0001, 0.05, None, Scale.LOG, (0.0005, 0.004),
                   "over which the force would grow to that at its initial stiffness"),
-        Parameter("sharpness_ratio", 1.0, 0.2, 10.0, None, Scale.LOG, (1.0,),
+        Parameter("sharpness_ratio", 1.0, 0.2, 10.0, None, Scale.LOG, (0.5, 2.0),
                   "exponent: the higher, the sharper the yield", default=1.0),
+        Parameter("reversal_ratio", 1.0, 1.0, 2.0, None, Scale.LINEAR, (1.0, 2.0),
+                  "stiffness when it is let go over that at first", default=1.0),
         AXLE,
     )
     source = ("R. Bouc, Proc. 4th Conf. on Nonlinear Oscillation, Prague (1967) 315; Y.-K. Wen, J. Eng. Mech. Div. "
@@ -51,6 +55,7 @@ class Hysteresis(ForceEffect):
     shown_by = "drive a smooth road and a rough one slowly, so that the suspension moves by a few millimetres"
     sought = Sought.ON_PARTS
     sought_last = True
+    refinements = ("sharpness_ratio", "reversal_ratio")
 
     def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
         if p.yield_force_n == 0:

@@ -44,7 +44,7 @@ class SensorBandwidth(SensorEffect):
     signature = "the measurement gets smaller and later than the model, more so at higher frequencies"
     shown_by = "drive a road with sharp edges, which excites high frequencies"
     realigns = True
-    not_of = ("encoder", "potentiometer", "force")
+    not_of = ("encoder", "potentiometer")
     stage = 3
 
     def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
