@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from logger.lab.likelihood.by_squares import BySquares
 from logger.lab.likelihood.distance_error import zero_of
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit_to_the_end
@@ -32,7 +33,8 @@ from logger.lab.selection.candidate_fit import chance_of
 from logger.lab.selection.evidence import FALSE_ALARM
 from logger.lab.selection.holdout import AS_FILED, REFITTED, ErrorStep, cross_validate, rising
 from logger.lab.selection.starts import fitted_from_starts
-from logger.vehicle.effect import Chosen
+from logger.runs import are_on_rig
+from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.named_parameters import read
 from logger.vehicle.uncertain import NumberErrors
 from logger.vehicle.vehicle import Vehicle
@@ -193,4 +195,23 @@ def _fit_with_effects(posterior: Posterior, before: LinearModel, refitted: tuple
     places = [posterior.state_at(refitted, one.logs, one.record, one.size)
               for one in (before.state, near) if one is not None]
     starts = [align(posterior, one) for one in (*places, posterior.start(nominal))]
-    return fit_to_the_end(min(starts, key=lambda one: one.score))
+    found = fit_to_the_end(min(starts, key=lambda one: one.score))
+    begun = _best_trial(posterior, before.state, nominal)
+    return found if begun is None else min(found, fit_to_the_end(LinearModel(posterior, begun)),
+                                           key=lambda one: one.score)
+
+
+def _best_trial(posterior: Posterior, near: State, nominal: tuple[Chosen, ...], improved: int = 3,
+                rounds: int = 6) -> State | None:
+    """On rigs, whose numbers are known less, where squares are least from sizes of the last effect that a search begins
+    at, the best so many of them improved; None on roads."""
+    if not are_on_rig(posterior.runs.runs):
+        return None
+    by_squares, one = BySquares.of(posterior), nominal[-1]
+    cars = (near.logs, posterior.prior.logs(posterior.vehicle, posterior.start_vehicle))
+    trials = [trial for values in one.effect.trials() if (trial := chosen(one.effect, values)).is_plain is one.is_plain]
+    begun = [by_squares.at((*nominal[:-1], trial), logs, near) for trial in trials for logs in cars]
+    best = sorted((there for there in begun if there is not None), key=lambda there: there[0])[:improved]
+    ends = [by_squares.improved(state, rounds) for _, state in best]
+    return by_squares.of_all(min(ends, key=lambda end: end[0])[1], near) if ends else None
+

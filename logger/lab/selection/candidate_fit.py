@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import prod
@@ -97,17 +97,22 @@ def refine(score: float, one: CandidateFit, worth: float = 0.0, rounds: int = 3)
 
 def with_refinements(score: float, one: CandidateFit) -> CandidateFit:
     """The fit of an effect in its plain form, or one with its refinements that begins there, if that is so much better
-    that it can be distinguished."""
-    posterior, state, numbers = one.found.posterior, one.found.state, one.found.numbers
-    names = one.effect.refinements if one.chosen.is_plain else ()
-    refined = [replace(one.chosen, values={**one.chosen.values, **{name: values[name] for name in names}})
-               for values in one.effect.trials() if names]
-    begun = [LinearModel(posterior, posterior.state_at((*state.effects[:-1], there), state.logs, state.record,
-                                                       state.size), numbers) for there in refined if not there.is_plain]
-    if not begun:
+    that it can be distinguished, and from a plain one that begins where it ended, too."""
+    effect = one.effect
+    if not effect.refinements or not one.chosen.is_plain:
         return one
-    found = CandidateFit.of(score, fit(min(begun, key=lambda each: each.score), numbers))
-    return found if found.gain > one.gain + INDISTINGUISHABLE else one
+
+    def fitted(found: CandidateFit, ways: Iterable[Mapping[str, float]]) -> CandidateFit:
+        posterior, state, numbers = found.found.posterior, found.found.state, found.found.numbers
+        begun = [LinearModel(posterior, posterior.state_at((*state.effects[:-1], replace(found.chosen, values={
+            **found.chosen.values, **{name: way[name] for name in effect.refinements}})), state.logs, state.record,
+            state.size), numbers) for way in ways]
+        return CandidateFit.of(score, fit(min(begun, key=lambda each: each.score), numbers))
+
+    refined = fitted(one, (way for way in effect.trials() if not Chosen(effect, way).is_plain))
+    if refined.gain > one.gain + INDISTINGUISHABLE:
+        one = max(one, fitted(refined, [effect.usual]), key=lambda each: each.gain)
+    return refined if refined.gain > one.gain + INDISTINGUISHABLE else one
 
 
 def refine_to_the_end(score: float, one: CandidateFit) -> CandidateFit:

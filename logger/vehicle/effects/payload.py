@@ -30,7 +30,9 @@ class Payload(VehicleEffect):
 
 class _OfPart(Payload):
     title = "a mass that is moved with the part: its fixture, the load cell's own, or fluid"
-    parameters = (replace(Payload.parameters[0], meaning="of what moves with the part"),)
+    # Where a car weighs hundreds of kilograms, the fixture of a bench of the same forces weighs some.
+    parameters = (replace(Payload.parameters[0], start=1.0, trials=(0.1, 1.0, 10.0),
+                          meaning="of what moves with the part"),)
     signature = "a force in phase with the acceleration, which grows with the square of the frequency"
     shown_by = "move it at higher frequencies, or the fixture alone"
     needs_body = False
