@@ -54,12 +54,14 @@ def measured(value: float, error: float | None) -> str:
 
 
 def numbers_of(one: Chosen) -> str:
-    """The numbers of an effect: ``friction_force_n 85 ± 4 N``; nothing for one that has none. Numbers that no fit
-    moves and that are as they are when nothing is said are left out."""
+    """The numbers of an effect: ``friction_force_n 85 ± 4 N``; nothing for one that has none. Numbers that are given
+    or say more than its plain form, and are as they are when nothing is said, are left out."""
     from logger.vehicle.effect import AXLE
 
     free = {parameter.name: parameter for parameter in one.freed}
-    usual = {parameter.name: parameter.default for parameter in one.effect.parameters if parameter.name not in free}
+    held = one.effect.refinements if one.is_plain else ()
+    usual = {parameter.name: parameter.default for parameter in one.effect.parameters
+             if parameter.given or parameter.name in held}
     inside = {name for name, parameter in free.items() if not parameter.at_bound(one.values[name])}
     said = [f"{name} {_with_unit(value, one.standard_errors.get(name), name, name in inside)}"
             for name, value in one.values.items() if usual.get(name) != value and name != AXLE.name]
