@@ -430,6 +430,11 @@ class Chosen:
         return all(self.values[name] == usual[name] for name in self.effect.refinements)
 
     @property
+    def is_refined_too_far(self) -> bool:
+        """Whether a refinement is at an end of its range, where nothing of it was measured."""
+        return not self.is_plain and self.at_bound
+
+    @property
     def freed(self) -> list[Parameter]:
         """Its parameters that a fit may move."""
         held = self.effect.refinements if self.is_plain else ()

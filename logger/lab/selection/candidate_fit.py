@@ -112,7 +112,8 @@ def with_refinements(score: float, one: CandidateFit) -> CandidateFit:
     refined = fitted(one, (way for way in effect.trials() if not Chosen(effect, way).is_plain))
     if refined.gain > one.gain + INDISTINGUISHABLE:
         one = max(one, fitted(refined, [effect.usual]), key=lambda each: each.gain)
-    return refined if refined.gain > one.gain + INDISTINGUISHABLE else one
+    better = refined.gain > one.gain + INDISTINGUISHABLE and not refined.chosen.is_refined_too_far
+    return refined if better else one
 
 
 def refine_to_the_end(score: float, one: CandidateFit) -> CandidateFit:

@@ -594,7 +594,7 @@ def _best_of_each(fits: Sequence[F]) -> list[F]:
     """The best fit of each effect, best first: in both axles, and in its plain form, where one of them alone, or its
     refinements, cannot be distinguished."""
     found: dict[str, F] = {}
-    for one in sorted(fits, key=lambda one: -one.gain - INDISTINGUISHABLE * (
-            (not one.chosen.where) + one.chosen.is_plain)):
+    for one in sorted(fits, key=lambda one: (one.chosen.is_refined_too_far, -one.gain - INDISTINGUISHABLE * (
+            (not one.chosen.where) + one.chosen.is_plain))):
         found.setdefault(one.effect.name, one)
     return sorted(found.values(), key=lambda one: -one.gain)
