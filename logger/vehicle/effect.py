@@ -432,7 +432,9 @@ class Chosen:
     @property
     def is_refined_too_far(self) -> bool:
         """Whether a refinement is at an end of its range, where nothing of it was measured."""
-        return not self.is_plain and self.at_bound
+        usual = self.effect.usual
+        return any(one.name in self.effect.refinements and self.values[one.name] != usual[one.name]
+                   and one.at_bound(self.values[one.name]) for one in self.effect.parameters)
 
     @property
     def freed(self) -> list[Parameter]:

@@ -96,8 +96,8 @@ def refine(score: float, one: CandidateFit, worth: float = 0.0, rounds: int = 3)
 
 
 def with_refinements(score: float, one: CandidateFit) -> CandidateFit:
-    """The fit of an effect in its plain form, or one with its refinements that begins there, if that is so much better
-    that it can be distinguished, and from a plain one that begins where it ended, too."""
+    """The fit of an effect in its plain form, or one with its refinements that begins there, if that explains most of
+    what the plain one leaves, and of what one that begins where it ended leaves, too."""
     effect = one.effect
     if not effect.refinements or not one.chosen.is_plain:
         return one
@@ -112,8 +112,8 @@ def with_refinements(score: float, one: CandidateFit) -> CandidateFit:
     refined = fitted(one, (way for way in effect.trials() if not Chosen(effect, way).is_plain))
     if refined.gain > one.gain + INDISTINGUISHABLE:
         one = max(one, fitted(refined, [effect.usual]), key=lambda each: each.gain)
-    better = refined.gain > one.gain + INDISTINGUISHABLE and not refined.chosen.is_refined_too_far
-    return refined if better else one
+    better = refined.gain > one.gain + INDISTINGUISHABLE and refined.hold_out.explains_most_beyond(one.hold_out)
+    return refined if better and not refined.chosen.is_refined_too_far else one
 
 
 def refine_to_the_end(score: float, one: CandidateFit) -> CandidateFit:

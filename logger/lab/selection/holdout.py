@@ -45,6 +45,10 @@ class HoldOut:
     error: float
     deviance: float
 
+    def explains_most_beyond(self, without: HoldOut) -> bool:
+        """Whether more than half of the power that a smaller model leaves is explained."""
+        return self.error**2 < 0.5 * without.error**2
+
     def is_worse_than(self, without: HoldOut) -> bool:
         """Whether the error is larger than that of a smaller model by more than a rounding."""
         return self.error > (1 + ROUNDING) * without.error

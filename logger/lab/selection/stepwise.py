@@ -148,7 +148,7 @@ class Likelihood(Protocol[M, P, F]):
     def leaves_noise(self, there: M | F) -> bool:
         """Whether what is left is noise though it is louder than expected."""
 
-    def explains_most(self, without: M, there: M | F) -> bool:
+    def explains_most(self, without: M | F, there: M | F) -> bool:
         """Whether more than half of the power of what was left is explained, on data that no fit saw."""
 
     def is_within_calibration(self, without: M) -> bool:
@@ -216,9 +216,9 @@ class MeasuredRoad:
         fitted = there if isinstance(there, Baseline) else there.found
         return is_coloured_noise(fitted.posterior, fitted.state)
 
-    def explains_most(self, without: Baseline, there: Baseline | CandidateFit) -> bool:
+    def explains_most(self, without: Baseline | CandidateFit, there: Baseline | CandidateFit) -> bool:
         """By the errors on held-out stretches."""
-        return there.hold_out.error**2 < 0.5 * without.hold_out.error**2
+        return there.hold_out.explains_most_beyond(without.hold_out)
 
     def is_within_calibration(self, without: Baseline) -> bool:
         """Of rigs."""
@@ -285,7 +285,7 @@ class Search(Generic[M, P, F]):
             one = self._screen_all(pool, base, [effect])[0]
         tries = self.likelihood.fitted_roughly(base.score, base, one, -np.inf)
         said = [each for each in tries if all(each.chosen.values[name] == value for name, value in values.items())]
-        return _best_of_each([self.likelihood.refined(base, each, 0.0) for each in said or tries])[0]
+        return self._best_of_each([self.likelihood.refined(base, each, 0.0) for each in said or tries])[0]
 
     def run(self, before: M) -> Selection[M, P, F]:
         """Search on top of a fitted model."""
@@ -405,7 +405,7 @@ class Search(Generic[M, P, F]):
             enough = effort.fit_share * to_gain
             tries += self._fit_all_roughly(pool, now.score, [
                 pair for pair in worth[1:] if _gains_enough(pair[1], enough)], enough)
-            rough = _best_of_each(tries)
+            rough = self._best_of_each(tries)
             enough = effort.refine_share * max([to_gain, *(one.gain for one in (*rough, *beside.fits))])
             best = {one.effect.name: one.gain for one in rough if _gains_enough(one, enough)}
             good = [one for one in sorted(tries, key=lambda one: -one.gain)
@@ -419,11 +419,23 @@ class Search(Generic[M, P, F]):
             good = [*good[:1], *(one for one in good[1:] if one.gain > enough)]
             fine += pool.map(refine, good[1:])
         # A fit that is much worse than the model without the effect has diverged: its screening says more.
-        fits = [one for one in _best_of_each([*fine, *(one for one in rough if one not in good), *beside.fits])
+        fits = [one for one in self._best_of_each([*fine, *(one for one in rough if one not in good), *beside.fits])
                 if one.gain > -min_gain(len(self.effects))]
         fitted = {one.effect.name for one in fits}
         rest = sorted((*unfitted, *beside.unfitted), key=lambda one: -one.gain)
         return SearchRound(tuple(fits), tuple(one for one in rest if one.effect.name not in fitted), now)
+
+    def _best_of_each(self, fits: Sequence[F]) -> list[F]:
+        """The best fit of each effect, best first: in both axles, where one of them alone cannot be distinguished; in
+        its plain form, unless its refinements explain most of what that leaves."""
+        found: dict[bool, dict[str, F]] = {True: {}, False: {}}
+        for one in sorted(fits, key=lambda one: -one.gain - INDISTINGUISHABLE * (not one.chosen.where)):
+            found[one.chosen.is_plain].setdefault(one.effect.name, one)
+        plain, refined = found[True], found[False]
+        best = {**refined, **plain, **{name: one for name, one in refined.items() if name in plain
+                                       and not one.chosen.is_refined_too_far
+                                       and self.likelihood.explains_most(plain[name], one)}}
+        return sorted(best.values(), key=lambda one: -one.gain)
 
     def _may_win(self, base: M, screened: Sequence[P], enough: float) -> list[tuple[M, P]]:
         """The first of some screenings on a model that gain enough."""
@@ -588,13 +600,3 @@ def _gains_enough(one: Promise | Fitted, enough: float) -> bool:
     """Whether an effect gains so much. What only shifts a run gains next to nothing to first order where the distance
     errors have taken it."""
     return one.gain > (enough if one.effect.reshapes else 0.0)
-
-
-def _best_of_each(fits: Sequence[F]) -> list[F]:
-    """The best fit of each effect, best first: in both axles, and in its plain form, where one of them alone, or its
-    refinements, cannot be distinguished."""
-    found: dict[str, F] = {}
-    for one in sorted(fits, key=lambda one: (one.chosen.is_refined_too_far, -one.gain - INDISTINGUISHABLE * (
-            (not one.chosen.where) + one.chosen.is_plain))):
-        found.setdefault(one.effect.name, one)
-    return sorted(found.values(), key=lambda one: -one.gain)

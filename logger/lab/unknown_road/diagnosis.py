@@ -258,7 +258,7 @@ class UnmeasuredRoad:
         """Never: a colour of the noise is not told from a road."""
         return False
 
-    def explains_most(self, without: RoadModel, there: RoadModel | RoadCandidate) -> bool:
+    def explains_most(self, without: RoadModel | RoadCandidate, there: RoadModel | RoadCandidate) -> bool:
         """Never: most of the power is the road's."""
         return False
 

@@ -45,7 +45,7 @@ class Hysteresis(ForceEffect):
                   "over which the force would grow to that at its initial stiffness"),
         Parameter("sharpness_ratio", 1.0, 0.2, 10.0, None, Scale.LOG, (0.5, 2.0),
                   "exponent: the higher, the sharper the yield", default=1.0),
-        Parameter("reversal_ratio", 1.0, 1.0, 2.0, None, Scale.LINEAR, (1.0, 2.0),
+        Parameter("reversal_ratio", 1.0, 1.0, 4.0, None, Scale.LINEAR, (1.0, 2.0),
                   "stiffness when it is let go over that at first", default=1.0),
         AXLE,
     )
