@@ -427,14 +427,15 @@ class Chosen:
     def is_plain(self) -> bool:
         """Whether it is without its refinements."""
         usual = self.effect.usual
-        return all(self.values[name] == usual[name] for name in self.effect.refinements)
+        return all(self.values.get(name, usual[name]) == usual[name] for name in self.effect.refinements)
 
     @property
     def is_refined_too_far(self) -> bool:
         """Whether a refinement is at an end of its range, where nothing of it was measured."""
         usual = self.effect.usual
-        return any(one.name in self.effect.refinements and self.values[one.name] != usual[one.name]
-                   and one.at_bound(self.values[one.name]) for one in self.effect.parameters)
+        return not self.is_plain and any(
+            one.name in self.effect.refinements and self.values[one.name] != usual[one.name]
+            and one.at_bound(self.values[one.name]) for one in self.effect.parameters)
 
     @property
     def freed(self) -> list[Parameter]:
@@ -463,8 +464,8 @@ class Chosen:
 
     @property
     def p(self) -> Values:
-        """The values by attribute."""
-        return Values(**self.values)
+        """The values by attribute; of refinements that it has not, what they are when nothing is said."""
+        return Values(**{name: self.effect.usual[name] for name in self.effect.refinements} | dict(self.values))
 
 
 def chosen(effect: Effect, values: Mapping[str, float], **more: Any) -> Chosen:

@@ -226,7 +226,8 @@ def test_a_drive_of_a_car_with_effects(folder: Path, capsys: pytest.CaptureFixtu
     made = json.loads(capsys.readouterr().out)
     assert made["effects"] == [
         {"effect": "dry_friction",
-         "parameters": {"friction_force_n": 90.0, "transition_velocity_m_per_s": 0.0, "axle": 0.0}},
+         "parameters": {"friction_force_n": 90.0, "transition_velocity_m_per_s": 0.0,
+                        "static_to_sliding_ratio": 1.0, "stribeck_velocity_m_per_s": 0.05, "axle": 0.0}},
         {"effect": "wheel_lift", "parameters": {}},
         {"effect": "body_bending",
          "parameters": {"frequency_hz": 22.0, "damping_ratio": 0.04, "participation": -0.3, "ends_move": 0.0}},
