@@ -109,9 +109,12 @@ def with_refinements(score: float, one: CandidateFit) -> CandidateFit:
             state.size), numbers) for way in ways]
         return CandidateFit.of(score, fit(min(begun, key=lambda each: each.score), numbers))
 
-    refined = fitted(one, (way for way in effect.trials() if not Chosen(effect, way).is_plain))
-    if refined.gain > one.gain + INDISTINGUISHABLE:
-        one = max(one, fitted(refined, [effect.usual]), key=lambda each: each.gain)
+    try:
+        refined = fitted(one, (way for way in effect.trials() if not Chosen(effect, way).is_plain))
+        if refined.gain > one.gain + INDISTINGUISHABLE:
+            one = max(one, fitted(refined, [effect.usual]), key=lambda each: each.gain)
+    except NotSimulated:
+        return one
     better = refined.gain > one.gain + INDISTINGUISHABLE and refined.hold_out.explains_most_beyond(one.hold_out)
     return refined if better and not refined.chosen.is_refined_too_far else one
 
