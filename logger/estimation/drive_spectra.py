@@ -44,8 +44,6 @@ _FINE = 2  # points of the model's spectrum for each bin: the window's autocorre
 _AT_ONCE = 256
 DRIVE_SPECTRA = "drive_spectra"
 """In a sidecar: what is kept of the drives of a session so that their car can be learnt of them."""
-STRETCH_S = 300.0
-"""A road is of one waviness for so long."""
 MOST_KEPT = 256
 """Blocks of a drive in its sidecar: some 8 kB. Nine minutes of steady driving know a car to a few per cent."""
 _WAITING_HALVES = 32  # half blocks: a minute of samples
@@ -65,14 +63,14 @@ class DriveSpectra:
     power        (b, k) mean one-sided spectrum in each of ``bands`` [m2/s4 per Hz]; NaN: the recorder does not pass it
     noise        (b,) known part of the readings' noise, as a spectrum: its sensor's and its steps' [m2/s4 per Hz]; NaN:
                  not known
-    stretch      (b,) number of the stretch of road that each is from; a stretch has one waviness
+    drive        (b,) number of the drive that each is from
     """
 
     speed_mps: Array
     spread: Array
     power: Array
     noise: Array
-    stretch: npt.NDArray[np.intp]
+    drive: npt.NDArray[np.intp]
 
     def __len__(self) -> int:
         return len(self.speed_mps)
@@ -80,16 +78,16 @@ class DriveSpectra:
     def part(self, chosen: Bools | slice) -> DriveSpectra:
         """Some of the blocks."""
         return DriveSpectra(self.speed_mps[chosen], self.spread[chosen], self.power[chosen], self.noise[chosen],
-                            np.unique(self.stretch[chosen], return_inverse=True)[1])
+                            np.unique(self.drive[chosen], return_inverse=True)[1])
 
 
 def joined(drives: Sequence[DriveSpectra]) -> DriveSpectra:
-    """Several drives as one; their stretches stay apart."""
-    begins = np.cumsum([0, *(int(one.stretch.max(initial=-1)) + 1 for one in drives[:-1])])
-    stretch = [one.stretch + begin for one, begin in zip(drives, begins, strict=True)]
+    """Several drives together."""
+    begins = np.cumsum([0, *(int(one.drive.max(initial=-1)) + 1 for one in drives[:-1])])
+    drive = [one.drive + begin for one, begin in zip(drives, begins, strict=True)]
     speed, spread, power, noise = (np.concatenate([getattr(one, name) for one in drives])
                                    for name in ("speed_mps", "spread", "power", "noise"))
-    return DriveSpectra(speed, spread, power, noise, np.concatenate(stretch))
+    return DriveSpectra(speed, spread, power, noise, np.concatenate(drive))
 
 
 @cache
@@ -147,12 +145,12 @@ def drive_spectra(accel_mps2: Array, speed_mps: Array, usable: Bools, rate_hz: f
     noise        spectrum of the part of the readings' noise that is known [m2/s4 per Hz]
     passed_hz    the recorder passes what is below
     """
-    return _of_stretches(*_blocks(accel_mps2, speed_mps, usable, rate_hz, passed_hz), noise)
+    _, *blocks = _blocks(accel_mps2, speed_mps, usable, rate_hz, passed_hz)
+    return _of_drive(*blocks, noise)
 
 
-def _of_stretches(begin_s: Array, speed_mps: Array, spread: Array, power: Array, noise: float) -> DriveSpectra:
-    stretch = np.unique((begin_s // STRETCH_S).astype(int), return_inverse=True)[1]
-    return DriveSpectra(speed_mps, spread, power, np.full(len(begin_s), noise), stretch)
+def _of_drive(speed_mps: Array, spread: Array, power: Array, noise: float) -> DriveSpectra:
+    return DriveSpectra(speed_mps, spread, power, np.full(len(power), noise), np.zeros(len(power), np.intp))
 
 
 def _blocks(accel_mps2: Array, speed_mps: Array, usable: Bools, rate_hz: float, passed_hz: float = np.inf
@@ -263,8 +261,7 @@ def spectra_of_fields(fields: Any) -> DriveSpectra:
     if not raw or len(raw) % size or len(raw) > MOST_KEPT * size:
         raise ValueError("expected whole blocks")
     rows = np.frombuffer(raw, np.uint8).reshape(-1, size)
-    begin_s, speed, spread = (rows[:, at].astype(float) + (256.0 * rows[:, at + 1] if at < 4 else 0.0)
-                              for at in (0, 2, 4))
+    speed, spread = rows[:, 2] + 256.0 * rows[:, 3], rows[:, 4].astype(float)
     if speed.min() < 100 * SLOWEST_MPS - 1:
         raise ValueError("expected speeds of a car that drives")
-    return _of_stretches(begin_s, speed / 100, spread / 1000, _FLOOR * 10 ** (rows[:, 5:] / 10), noise)
+    return _of_drive(speed / 100, spread / 1000, _FLOOR * 10 ** (rows[:, 5:] / 10), noise)

@@ -15,7 +15,7 @@ import numpy as np
 Array = np.ndarray
 
 RATE_HZ, FINE = 100, 4
-SPACING_M = 0.05
+SPACING_M = 0.0125  # means over a tire between points: at 0.05 m a patch of 0.22 m acts as one of 0.24 m
 PAD = 4000
 MPH = 0.44704
 
