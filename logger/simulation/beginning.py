@@ -57,7 +57,9 @@ def beginning(car: Car, passage: Passage, run: Run, recorded: Recorded, near: Be
     count = 2 * len(car.structure.mass) + car.memories
     passage.under_wheels(passage.driven(car.structure))  # asked for once, for all states
     # What hangs on a car has a state as soon as it weighs something.
-    if near is not None and len(near.state) == count and car.bends_laws and len(weighed.measured):
+    # One cycle is another number of samples of another road.
+    alike = near is not None and near.columns.shape == (len(weighed.measured), count)
+    if near is not None and alike and car.bends_laws and len(weighed.measured):
         return _bent_beginning(car, passage, weighed, near, is_near=True)
     plain = _linear_beginning(car, passage, weighed, count)
     if not car.bends_laws or not len(weighed.measured):
