@@ -238,10 +238,16 @@ def changes(passes: Passes, scatter: Scatter, split_s: float, length_m: float) -
 def _mean_change(passes: Passes, scatter: Scatter, split_s: float, length_m: float) -> tuple[float, float]:
     """The mean over cells that were passed in both periods, with its standard error: what is common to a drive does not
     fall with its cells; what is common to all is in it as far as it differs. Drives that have errors alike differ by
-    less, which is not counted here, as it is not in one cell."""
+    less, which is not counted here, as it is not in one cell. A cell counts by the length that both periods cover, in
+    both, as else how cells differ would be taken for a change."""
     if not len(passes.key):
         return float("nan"), float("nan")
-    found = _group_means(passes, replace(scatter, alike=0.0), length_m, (passes.time_s >= split_s).astype(np.intp))
+    period = (passes.time_s >= split_s).astype(np.intp)
+    _, cell = np.unique(passes.key, return_inverse=True)
+    covered_m = np.zeros((2, cell.max() + 1))
+    np.maximum.at(covered_m, (period, cell), passes.known_m)
+    both = replace(passes, known_m=np.minimum(passes.known_m, covered_m.min(axis=0)[cell]))
+    found = _group_means(both, replace(scatter, alike=0.0), length_m, period)
     change, common = (float(np.diff(one)[0]) for one in (found.mean, found.common))
     return change, float(np.sqrt(found.variance.sum() + common**2))
 

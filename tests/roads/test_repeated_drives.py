@@ -192,6 +192,14 @@ def test_the_mean_change_of_a_route_has_a_standard_error_that_holds() -> None:
     assert not len(nowhere.key) and np.isnan(nowhere.mean_m_per_km)
 
 
+def test_a_cell_that_a_period_covers_in_part_is_no_change() -> None:
+    """Cells of 1 and 9 m/km that stay what they are; the later drive ends 10 m into the second."""
+    key = place_key(np.zeros(4, np.intp), np.array([50.0, 50.0, 150.0, 150.0]), 100.0)
+    drive, time_s, iri = np.array([0, 1, 0, 1]), np.array([0.0, 9.0, 0.0, 9.0]), np.array([1.0, 1.0, 9.0, 9.0])
+    passes = Passes(key, drive, time_s, iri, WindowErrors.undivided(np.full(4, 0.05)), np.array([100.0] * 3 + [10.0]))
+    assert changes(passes, Scatter(0.0, 0.0), 5.0, 100.0).mean_m_per_km == pytest.approx(0.0, abs=1e-12)
+
+
 def test_what_got_worse_is_found_and_little_else() -> None:
     rng = np.random.default_rng(4)
     growth = np.where(np.arange(200) < 20, 0.4, 0.0)
