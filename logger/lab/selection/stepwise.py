@@ -198,7 +198,7 @@ class MeasuredRoad:
 
     def with_effect(self, one: CandidateFit) -> Baseline:
         """The model with the effect, its runs aligned again."""
-        found = with_refinements(one.found.score, one).found
+        found = with_refinements(one.found.score + one.gain, one).found
         return Baseline.of(fit(align(found.posterior, found.state), found.numbers))
 
     def chance(self, one: Chosen, gain: float, base: Baseline, candidates: int) -> float:
