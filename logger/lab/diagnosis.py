@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 from types import MappingProxyType
 
 import numpy as np
@@ -41,7 +42,7 @@ from logger.lab.residuals.road_coherence import best_linear_share
 from logger.lab.residuals.unexplained import Shape, shape_of
 from logger.lab.selection.candidate_fit import CandidateFit, chance_of
 from logger.lab.selection.detectability import Undetectable, effect_as_moved, undetectable_effects
-from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE
+from logger.lab.selection.evidence import FALSE_ALARM, IMITATION, INDISTINGUISHABLE
 from logger.lab.selection.filter_without_delay import below_filter_without_delay
 from logger.lab.selection.holdout import AS_FILED, REFITTED, ErrorStep, HoldOut, cross_validate
 from logger.lab.selection.screening import Baseline, Screened, misalignment
@@ -85,7 +86,8 @@ class LabDiagnosis:
     catalogue            all effects that were asked for, by name
     baseline_error       of the model as it stands
     final_error          of the model that it ends with
-    best_linear          share of the measured power that a linear car could explain at most; None: the runs do not say
+    best_linear          share of the measured power that a linear car could explain at most; None: the runs do not say,
+                         or a linear one explains more
     noise                of the sensors, their rounding in it
     candidates           missing effects first, with their final values; then the others of the first round that are
                          better than the refitted model, the least probable by chance first
@@ -175,6 +177,14 @@ class LabDiagnosis:
     def unexplained(self) -> bool:
         """Whether the effects of the verdict, in a car within its priors, do not explain all."""
         return self.exceeds_noise or self.in_conflict
+
+    def exceeds_imitation(self, name: str) -> bool:
+        """Whether what is left beyond the noise is less than ``IMITATION`` of what an effect of the verdict and that
+        explain together: of so little, the effect is no imitation."""
+        left = max(self.final_error**2 - self.noise_floor_error**2, 0.0)
+        removed = sum(before.error**2 - there.error**2 for before, there in pairwise(self.steps)
+                      if there.words == f"with {name}")
+        return left < IMITATION * (removed + left)
 
     @property
     def contradicted_by(self) -> tuple[str, ...]:
@@ -296,20 +306,23 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
         effects=errors.effects,
         undetectable=hidden, shape=shape if excess > UNEXPLAINED else None, coloured=colour is not None,
         removed=removed, band=compared_band(fine.runs.runs), signals=signal_errors_of(fine, baseline, state),
-        shows_forces=fine.shows_forces, best_linear=_best_linear(selection.before),
+        shows_forces=fine.shows_forces, best_linear=_best_linear(selection),
         signals_off=signals_off(fine.record_errors, state.record), excess_of=excess_of,
         state=state, car=fitted_car(fine, baseline, state), tolerance=posterior.tolerance.share,
     )
 
 
-def _best_linear(before: Baseline) -> float | None:
-    """What a linear car could explain at most, by the refitted model, where that is linear."""
-    posterior, state = before.posterior, before.state
-    runs, car = posterior.runs.runs, posterior.car(state.effects, state.logs)
+def _best_linear(selection: Selection) -> float | None:
+    """What a linear car could explain at most, by the refitted model, where that is linear; None where the model that
+    was found is linear too, and explains more: what resonates longer than a segment is less coherent there."""
+    before, now = selection.before, selection.now
+    runs = before.posterior.runs.runs
+    car, found = (one.posterior.car(one.state.effects, one.state.logs) for one in (before, now))
     if car.bends_laws:
         return None
-    main = [run.main(one) for run, one in zip(runs, state.predictions, strict=True)]
-    return best_linear_share(ModelResiduals(runs, car, main, ()), before.hold_out.error)
+    main = [run.main(one) for run, one in zip(runs, before.state.predictions, strict=True)]
+    share = best_linear_share(ModelResiduals(runs, car, main, ()), before.hold_out.error)
+    return share if share is None or found.bends_laws or share > 1 - now.hold_out.error**2 else None
 
 
 def refit(posterior: Posterior, nominal: State) -> Baseline:
@@ -407,19 +420,17 @@ def _candidates(selection: Selection, after: State, count: int) -> tuple[tuple[C
     each with its error on top of that model; and the names of those that are no better."""
     values = {one.effect.name: one.values for one in after.effects}
     effects = {one.effect.name: one.effect for one in after.effects}
-    before = selection.before.hold_out
-    stages, freedom = dict(selection.steps), selection.before.posterior.freedom
-    alone = {one.effect.name: one.hold_out for one in selection.first.fits}
-    found = []
+    before, freedom, first = selection.before.hold_out, selection.before.posterior.freedom, selection.first
+    tried = [_of_fit(one, before, count, first.fits) for one in first.fits]
+    tried += [_of_promise(selection.before, one, before, count) for one in first.unfitted]
+    alone, last, found = {one.effect.name: one for one in tried}, selection.now.hold_out, []
     for name, gain in selection.gains.items():
-        there = alone.get(name) or stages.get(name) or selection.now.hold_out
         by_chance = chance_of([Chosen(effects[name], values[name])], gain, freedom, count)
-        found.append(CandidateEffect(effects[name], values[name], there.error, by_chance, gain,
-                                     before.deviance - there.deviance, selection.rivals.get(name, ())))
-    fits = [one for one in selection.first.fits if one.effect.name not in selection.gains]
-    others = [_of_fit(one, before, count, selection.first.fits) for one in fits]
-    others += [_of_promise(selection.before, one, before, count) for one in selection.first.unfitted
-               if one.effect.name not in selection.gains]
+        error, held_out = ((alone[name].error, alone[name].held_out_gain) if name in alone else
+                           (last.error, before.deviance - last.deviance))
+        found.append(CandidateEffect(effects[name], values[name], error, by_chance, gain, held_out,
+                                     selection.rivals.get(name, ())))
+    others = [one for one in tried if one.effect.name not in selection.gains]
     better = [one for one in others if one.gain > 0 and one.error < before.error]
     return ((*found, *sorted(better, key=lambda one: (one.p_value, -one.gain))),
             tuple(one.effect.name for one in others if one not in better))

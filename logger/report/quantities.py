@@ -62,18 +62,19 @@ def numbers_of(one: Chosen) -> str:
     held = one.effect.refinements if one.is_plain else ()
     usual = {parameter.name: parameter.default for parameter in one.effect.parameters
              if parameter.given or parameter.name in held}
-    inside = {name for name, parameter in free.items() if not parameter.at_bound(one.values[name])}
-    said = [f"{name} {_with_unit(value, one.standard_errors.get(name), name, name in inside)}"
+    ends = {name: end for name, parameter in free.items() for end in (parameter.low, parameter.high)
+            if parameter.is_at(end, one.values[name])}
+    said = [f"{name} {_with_unit(ends.get(name, value), one.standard_errors.get(name), name, name not in ends)}"
             for name, value in one.values.items() if usual.get(name) != value and name != AXLE.name]
     return ", ".join([one.where] * bool(one.where) + said)
 
 
 def _with_unit(value: float, error: float | None, name: str, inside: bool) -> str:
     """A number with its unit; one ``inside`` its range of which nothing is known is said to be so, and one that was
-    fitted and came to an end of it, which 0 is by nature."""
-    unseen = "" if error is None or error < inf else (
+    fitted and came to an end of it, which 0 is by nature: that has no standard error."""
+    unseen = "" if error is None or (inside and error < inf) else (
         " (these runs do not show it)" if inside else " (the end of its range, no measured value)" if value else "")
-    return f"{measured(value, error)} {unit_of(name)}".rstrip() + unseen
+    return f"{measured(value, error if inside else None)} {unit_of(name)}".rstrip() + unseen
 
 
 def chance(p_value: float) -> str:

@@ -92,8 +92,10 @@ def test_a_signal_that_contradicts_the_others_is_named() -> None:
 
 
 def test_beside_something_unexplained_it_is_only_part_or_an_imitation() -> None:
-    missing, left, *_ = diagnosis_summary(replace(FOUND, excess=0.5))
+    missing, *_ = diagnosis_summary(replace(FOUND, excess=0.5, final_error=0.18))
     assert "dry_friction explains part of the residual, or imitates something else" in missing
+    missing, left, *_ = diagnosis_summary(replace(FOUND, excess=0.5))
+    assert missing.startswith("dry_friction is missing")  # a hundred times what is left
     assert left == ("Something more is missing that no known effect explains: in the worst run the residual is 1.5 "
                     "times the sensor's noise. Beyond that noise it is less than 0.1% of the measured power.")
 
@@ -124,7 +126,10 @@ def test_numbers_outside_their_tolerance_are_named_with_how_far_they_are_off() -
     conflict, _ = diagnosis_summary(found)
     assert found.unexplained and not found.exceeds_noise
     assert conflict.startswith("Parameters beyond their tolerance: "
-                               "front.suspension_stiffness_n_per_m by +24%, sprung_mass_kg by -13%. Measure them")
+                               "front.suspension_stiffness_n_per_m by +24% (1.24 times the file's), sprung_mass_kg by "
+                               "-13% (0.87 times the file's). Measure them: either")
+    missing, beyond, *_ = diagnosis_summary(replace(FOUND, beyond=found.beyond, in_conflict=True))
+    assert missing.startswith("dry_friction is missing") and beyond.endswith("them: the vehicle's file is wrong there.")
 
 
 def test_numbers_off_by_less_than_a_conflict_are_named_too() -> None:
@@ -132,7 +137,7 @@ def test_numbers_off_by_less_than_a_conflict_are_named_too() -> None:
     nothing, beyond, _ = diagnosis_summary(found)
     assert not found.unexplained
     assert nothing.startswith("No effect is missing") and "within their tolerance" not in nothing
-    assert "front.cg_distance_m by +5%, rear.cg_distance_m by +5%. Measure them" in beyond
+    assert "front.cg_distance_m by +5% (1.05 times the file's), rear.cg_distance_m by +5% (" in beyond
 
 
 def test_what_the_tolerance_absorbed_is_said_with_its_error_and_what_does_the_same() -> None:

@@ -27,6 +27,9 @@ def test_units_are_the_ends_of_names() -> None:
     one = chosen(shipped_effects()["dry_friction"], {"friction_force_n": 85.2},
                  standard_errors={"friction_force_n": 4.1})
     assert numbers_of(one) == "friction_force_n 85 ± 4 N, transition_velocity_m_per_s 0 m/s"
+    ended = chosen(shipped_effects()["frame_friction"], {"friction_force_n": 0.7, "body_friction_force_n": 5.7e-7},
+                   standard_errors={"friction_force_n": 0.01, "body_friction_force_n": 7e-9})
+    assert numbers_of(ended).startswith("friction_force_n 0.700 ± 0.010 N, body_friction_force_n 0 N")
     assert [chance(p) for p in (1e-30, 2e-4, 0.3, 1.0)] == ["below 1e-9", "0.0002", "0.30", "1.00"]
 
 

@@ -393,10 +393,10 @@ def _left_over(found: LabDiagnosis, how: str, over: float) -> str:
 
 
 def _explained_power(found: LabDiagnosis) -> str:
-    refitted, last = (percent(one) if one < 0.995 else f"{one:.2%}" for one in found.explained)
+    refitted, last, most = (percent(one) if one < 0.995 else f"{one:.2%}"
+                            for one in (*found.explained, found.best_linear or 0.0))
     ends = f", {last} finally" * (len(found.steps) > 2)
-    linear = "" if found.best_linear is None else (
-        f" No linear model can explain more than {percent(found.best_linear)}.")
+    linear = "" if found.best_linear is None else f" No linear model can explain more than {most}."
     return f"Share of the measured power explained: {refitted} with the parameters refitted{ends}.{linear}"
 
 
@@ -422,9 +422,11 @@ def _car(found: LabDiagnosis) -> list[str]:
     """What the runs say of the car's own parameters: paragraphs."""
     lines = []
     if found.beyond:
-        off = ", ".join(f"{name} by {share:+.0%}" for name, share in found.beyond.items())
-        lines.append(f"Parameters beyond their tolerance: {off}. Measure them: either the vehicle's file is wrong "
-                     "there, or an unknown effect is missing.")
+        off = ", ".join(f"{name} by {share:+.0%} ({1 + share:.3g} times the file's)"
+                        for name, share in found.beyond.items())
+        either = "" if found.missing and not found.exceeds_noise else ", or an unknown effect is missing"
+        lines.append(f"Parameters beyond their tolerance: {off}. Measure them: {'either ' * bool(either)}the vehicle's "
+                     f"file is wrong there{either}.")
     if found.left_open:
         fitted = enumerated([f"{name} {measured(value, error)} {unit_of(name)}".rstrip()
                              for name, (value, error) in found.left_open.items()], "and")
@@ -467,7 +469,8 @@ def _missing(found: LabDiagnosis, one: Chosen) -> str:
     if name in found.ends:
         there, count = found.ends[name]
         likely += f" The model's parameters were unknown; {there} of {count} starting points led to this result."
-    says = "explains part of the residual, or imitates something else" if found.unexplained else "is missing"
+    says = ("is missing" if not found.exceeds_noise or found.exceeds_imitation(name) else
+            "explains part of the residual, or imitates something else")
     if candidate.confused_with:
         names = [name, *candidate.confused_with]
         group = f"Either {enumerated(names, 'or')}" if len(names) == 2 else f"One of {enumerated(names, 'and')}"
@@ -629,7 +632,7 @@ def _tiles(found: LabDiagnosis) -> doc.Html:
     count = "nothing" if not missing else f"{missing} effect{'s' * (missing != 1)}"
     unknown = "something unknown" if not missing else f"{count}, and more"
     return doc.tiles([
-        ("Missing", unknown if found.unexplained else count, ""),
+        ("Missing", unknown if found.exceeds_noise or (found.unexplained and not missing) else count, ""),
         ("NRMSE, file unchanged", f"{found.baseline_error:.3f}", ""),
         ("NRMSE with the missing effects" if missing else "NRMSE refitted", f"{found.final_error:.3f}", "refitted"),
         *drift_tile(found.removed),

@@ -186,6 +186,14 @@ def excess_by_signal(posterior: Posterior, state: State, chance: float, noise: N
     return found
 
 
+def is_within_discrepancy(posterior: Posterior, state: State, other: State) -> bool:
+    """Whether two states predict the same of every signal, but for what two right simulations of one model differ by.
+    """
+    changes = [one - of for one, of in zip(posterior.residuals(state), posterior.residuals(other), strict=True)]
+    return all(np.mean(np.concatenate([part[run.first:] for run, part in zip(one.runs, one.residuals, strict=True)])**2)
+               < (DISCREPANCY * one.size)**2 for one in by_signal(posterior.readings, posterior.bands, changes))
+
+
 def floor_error(posterior: Posterior, noise: NoiseLevel) -> float:
     """Noise floor: rms(noise) / rms(measured) over all samples that count, both in the pass band."""
     runs = posterior.runs.runs

@@ -18,6 +18,7 @@ import numpy as np
 
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit, fit_to_the_end
+from logger.lab.likelihood.noise_floor import is_within_discrepancy
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.residuals.noise_colour import is_coloured_noise
 from logger.lab.selection.candidate_fit import CandidateFit, chance_of, fit_roughly, refine, with_refinements
@@ -207,9 +208,11 @@ class MeasuredRoad:
 
     def is_doubtful(self, base: Baseline, one: CandidateFit) -> bool:
         """Whether a fit is at an end of its range, or beyond what the records show, or of a rig predicts what no fit
-        saw worse. (On a road the distance errors, which are fitted to all of a run, do the same as many an effect.)"""
-        return is_outside_data(base.posterior, one.chosen) or (
-            base.on_rig and one.hold_out.is_worse_than(base.hold_out))
+        saw worse, or no other than two right simulations of one model would. (On a road the distance errors, which are
+        fitted to all of a run, do the same as many an effect.)"""
+        return is_outside_data(base.posterior, one.chosen) or (base.on_rig and (
+            one.hold_out.is_worse_than(base.hold_out)
+            or is_within_discrepancy(base.posterior, base.state, one.found.state)))
 
     def leaves_noise(self, there: Baseline | CandidateFit) -> bool:
         """Whether what is left is noise of a colour."""

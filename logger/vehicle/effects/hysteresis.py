@@ -46,7 +46,7 @@ class Hysteresis(ForceEffect):
         Parameter("sharpness_ratio", 1.0, 0.2, 10.0, None, Scale.LOG, (0.5, 2.0),
                   "exponent: the higher, the sharper the yield", default=1.0),
         Parameter("reversal_ratio", 1.0, 1.0, 4.0, None, Scale.LINEAR, (1.0, 2.0),
-                  "stiffness when it is let go over that at first", default=1.0),
+                  "stiffness when it is let go over the initial one", default=1.0),
         AXLE,
     )
     source = ("R. Bouc, Proc. 4th Conf. on Nonlinear Oscillation, Prague (1967) 315; Y.-K. Wen, J. Eng. Mech. Div. "

@@ -11,7 +11,7 @@ from logger.vehicle.laws import CornerLaws
 
 
 class ProgressiveSpring(ForceEffect):
-    title = "cubic hardening of the suspension springs"
+    title = "cubic hardening or softening of the suspension springs"
     parameters = (
         Parameter("cubic_stiffness_n_per_m3", 1e6, -2e7, 1e9, 0.0, Scale.LINEAR, (3e5, 3e6, 3e7),
                   "force per cube of the travel from rest, of each suspension"),
