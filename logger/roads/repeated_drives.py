@@ -441,7 +441,7 @@ def _group_means(passes: Passes, scatter: Scatter, cell_m: float, of: Ints) -> _
     which = which.ravel()
     by_drive = np.bincount(which, share)
     order = np.lexsort((passes.key, which))
-    at_m = np.asarray(cell_m * way_and_cell(passes.key)[1], dtype=np.float64)
+    at_m = cell_m * passes.key.astype(np.float64)  # ways are far apart
     of_drives = errors_of_means(passes.iri_errors, passes.iri_m_per_km, at_m, share, order, share[order], which[order],
                                 len(by_drive))
     of_drive = np.sqrt(of_drives.std**2 - of_drives.common_std**2) * by_drive

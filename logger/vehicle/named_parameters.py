@@ -301,12 +301,11 @@ def free_parameter_named(effects: Sequence[Chosen], name: str) -> FreeParameter 
     if effect not in names:
         return None
     index = names.index(effect)
-    numbers = [one.name for one in effects[index].effect.parameters]
-    free_parameters = free_parameters_of(effects, [index])
-    if leaf not in numbers or FreeParameter(index, numbers.index(leaf)) not in free_parameters:
-        known = ", ".join(f"{effect}.{numbers[free.parameter]}" for free in free_parameters) or "none of it"
+    free = {one.name: FreeParameter(index, at) for at, one in enumerate(effects[index].effect.parameters) if one.is_free}
+    if leaf not in free:  # refinements are free where they are asked for
+        known = ", ".join(f"{effect}.{one}" for one in free) or "none of it"
         raise ValueError(f"{effect} has no number {leaf!r} that a fit can move; expected {known}")
-    return FreeParameter(index, numbers.index(leaf))
+    return free[leaf]
 
 
 def free_number(effects: Sequence[Chosen], free: FreeParameter, start: float | None = None,

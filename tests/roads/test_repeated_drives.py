@@ -192,6 +192,18 @@ def test_the_mean_change_of_a_route_has_a_standard_error_that_holds() -> None:
     assert not len(nowhere.key) and np.isnan(nowhere.mean_m_per_km)
 
 
+def test_errors_of_cells_on_different_ways_are_not_one_error() -> None:
+    """What neighbouring windows have alike, on 40 ways of a cell each: it falls by the root of their number."""
+    std = []
+    for count in (1, 40):
+        key = place_key(np.repeat(np.arange(count), 2), np.full(2 * count, 10.0), 20.0)
+        drive, none = np.tile([0, 1], count), np.zeros(2 * count)
+        errors = WindowErrors(none + 0.2, none + 0.15, none, none)
+        passes = Passes(key, drive, 9.0 * drive, none + 2.0, errors, none + 20.0)
+        std.append(changes(passes, Scatter(0.0, 0.0), 5.0, 20.0).mean_std_m_per_km)
+    assert std[1] == pytest.approx(std[0] / np.sqrt(40), rel=1e-6)
+
+
 def test_a_cell_that_a_period_covers_in_part_is_no_change() -> None:
     """Cells of 1 and 9 m/km that stay what they are; the later drive ends 10 m into the second."""
     key = place_key(np.zeros(4, np.intp), np.array([50.0, 50.0, 150.0, 150.0]), 100.0)

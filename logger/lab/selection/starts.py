@@ -124,6 +124,7 @@ class UnknownNumbers(MeasuredRoad):
                   for state in best.values()]
         found.sort(key=lambda one: -one.gain)
         alike = [deviance for deviance, state in ends if state.effects[-1].is_plain == found[0].chosen.is_plain]
+        alike = alike or [deviance for deviance, _ in ends]  # no drawn car of that form could be simulated
         self.ends[one.effect.name] = sum(each < alike[0] + INDISTINGUISHABLE for each in alike), len(alike)
         return found
 
