@@ -301,7 +301,8 @@ def free_parameter_named(effects: Sequence[Chosen], name: str) -> FreeParameter 
     if effect not in names:
         return None
     index = names.index(effect)
-    free = {one.name: FreeParameter(index, at) for at, one in enumerate(effects[index].effect.parameters) if one.is_free}
+    free = {one.name: FreeParameter(index, at)
+            for at, one in enumerate(effects[index].effect.parameters) if one.is_free}
     if leaf not in free:  # refinements are free where they are asked for
         known = ", ".join(f"{effect}.{one}" for one in free) or "none of it"
         raise ValueError(f"{effect} has no number {leaf!r} that a fit can move; expected {known}")
