@@ -158,7 +158,7 @@ class SimulatedRuns:
             steps = car.bends_laws or car.structure.held
             for step_s, forces in {(one.step_s, one.forces) for one in passages if steps}:
                 stepper_of(car, step_s, forces)  # made once, before both threads ask for it
-        each: Iterable[Array] = (self._steppers.map if car.bends_laws else map)(
+        each: Iterable[Array] = (self._steppers.map if car.bends_laws and len(passages) > 1 else map)(
             partial(_recorded, car), passages, self.runs)
         return [run.in_band(one) for run, one in zip(self.runs, each, strict=True)]
 

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -63,6 +64,7 @@ def static_tire_loads_n(structure: Structure) -> Array:
     return np.asarray(-structure.tires * (structure.wheels @ sag))
 
 
+@lru_cache(maxsize=16)
 def force_input(structure: Structure) -> Array:
     """What forces at the suspensions, then at the tires, do to the state's derivative (2 n, 2 w)."""
     onto = -np.hstack([structure.travel.T, structure.wheels.T])

@@ -217,6 +217,8 @@ class Structure:
         """The state (2n,) that stays where it is under these inputs (u,); at 0 in a direction without any spring."""
         if self.held:
             return inputs[:2]
+        if not inputs.any():
+            return np.zeros(2 * len(self.mass))
         still = np.linalg.lstsq(self.stiffness, self.road @ inputs)[0] if self.on_base else (
             np.linalg.solve(self.stiffness, self.road @ inputs))
         return np.concatenate([still, np.zeros(len(self.mass))])
