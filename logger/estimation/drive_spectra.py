@@ -145,8 +145,7 @@ def drive_spectra(accel_mps2: Array, speed_mps: Array, usable: Bools, rate_hz: f
     noise        spectrum of the part of the readings' noise that is known [m2/s4 per Hz]
     passed_hz    the recorder passes what is below
     """
-    _, *blocks = _blocks(accel_mps2, speed_mps, usable, rate_hz, passed_hz)
-    return _of_drive(*blocks, noise)
+    return _of_drive(*_blocks(accel_mps2, speed_mps, usable, rate_hz, passed_hz)[1:], noise)
 
 
 def _of_drive(speed_mps: Array, spread: Array, power: Array, noise: float) -> DriveSpectra:
