@@ -171,8 +171,7 @@ class Run:
     more             (s, n) what the signals of ``facts`` measured, without their means, as their zeros are not known
     low_pass         what was found of it; None: nothing
     outside_mps2     r.m.s. of what a model and the sensor differ by outside of the pass band [m/s2]
-    cut_s            how much of its drive is in no run, as nothing drove it or nothing was read; of one run of a
-                     drive
+    left_out         what of its drive is in no run, told of one run of a drive, or is no reading
 
     ValueError for columns of different lengths, or fewer than two samples after the beginning.
     """
@@ -189,7 +188,7 @@ class Run:
     more: Array = field(default_factory=lambda: np.empty((0, 0)))
     low_pass: LowPass | None = None
     outside_mps2: float = 0.0
-    cut_s: float = 0.0
+    left_out: tuple[LeftOut, ...] = ()
 
     def __post_init__(self) -> None:
         if len(self.more) != len(self.signals) or any(len(one) != self.count for one in self.more):
@@ -236,17 +235,24 @@ class Run:
     def residual(self, prediction: Array, measured_mps2: Array | None = None) -> Array:
         """Measured minus predicted (n,), or of more signals joined to it [m/s2]; with ``measured_mps2`` (n,), of these
         readings in place of the sensor's. It is 0 where nothing was read, and of a clipped reading what the prediction
-        falls short of it by."""
-        main = self.main(prediction)
+        falls short of it by; a zero that is not known is then what makes the others' mean 0, as that of the record is
+        another one."""
+        main, whole = self.main(prediction), self.counted[: self.count]
+        if self.usable is not None:
+            whole &= self.usable == READING
+            if not zero_is_known(self.facts.main, self.track):
+                main = main + (self.measured_mps2 - main) @ whole / max(1, whole.sum())
         residual = (self.measured_mps2 if measured_mps2 is None else measured_mps2) - main
         if self.usable is not None:
-            way = np.sign(self.measured_mps2)
+            way = np.sign(self.measured_mps2 - self.measured_mps2.mean())  # ends of a range lie on either side
             short = way * (self.measured_mps2 - main) - 0.5 * (self.facts.step_mps2 or 0.0)  # it may be rounded up
             residual = np.where(self.usable == CLIPPED, way * np.maximum(short, 0.0),
                                 np.where(self.read, residual, 0.0))
         if len(main) == len(prediction):
             return residual
-        others = (self.more - prediction[self.count :].reshape(-1, self.count)) * self.read
+        others = self.more - prediction[self.count :].reshape(-1, self.count)
+        if self.usable is not None:
+            others = (others - others @ whole[:, None] / max(1, whole.sum())) * self.read
         return np.concatenate([residual, others.ravel()])
 
     @property
@@ -371,12 +377,16 @@ def normalised_rms(residuals: Sequence[Array], measured: Sequence[Array]) -> flo
 
 def runs_left_out(runs: Sequence[Run]) -> tuple[LeftOut, ...]:
     """What of the drives that these runs are of is compared with nothing."""
-    return counting((
-        LeftOut(sum(run.cut_s for run in runs), "s", "in which nothing drove it or nothing was read"),
-        LeftOut(sum(run.first / run.rate_hz for run in runs), "s",
-                "at the beginning of runs, as the motion before is unknown"),
-        LeftOut(sum(np.count_nonzero(~run.read[run.first:]) / run.rate_hz for run in runs), "s",
-                "in short holes between readings")))
+    return counting((*(one for run in runs for one in run.left_out),
+                     LeftOut(sum(run.first / run.rate_hz for run in runs), "s",
+                             "at the beginning of runs, as the motion before is unknown")))
+
+
+def no_readings(usable: Array | None) -> tuple[LeftOut, ...]:
+    """What of samples (n,) is no reading, by what they are, as in ``Run``."""
+    return () if usable is None else (
+        LeftOut(float(np.count_nonzero(usable == NO_READING)), "sample", "without a reading"),
+        LeftOut(float(np.count_nonzero(usable == CLIPPED)), "sample", "at an end of the sensor's range, but as bounds"))
 
 
 def short_names(runs: Sequence[Run]) -> dict[str, str]:

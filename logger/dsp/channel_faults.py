@@ -26,10 +26,10 @@ _FOLLOWS, _AGAINST = 0.3, 0.9
 _SLOWEST_HZ, _HIGHEST_OF_RATE = 0.3, 0.37
 
 
-def share_at_ends(samples: Array) -> float:
-    """Of samples (n,) the share that stands at the largest or the smallest value, come to in a leap."""
-    ends = [(samples == end) for end in (samples.max(), samples.min())]
-    return sum(float(end.mean()) for end in ends if _is_leapt_to(samples, end))
+def at_ends(samples: Array) -> Bools:
+    """Which of samples (n,) stand at the largest or the smallest value, if those are come to in a leap."""
+    ends = [samples == end for end in (samples.max(), samples.min())]
+    return np.any([end & _is_leapt_to(samples, end) for end in ends], axis=0)
 
 
 def longest_still(samples: Array, rate_hz: float) -> tuple[int, int] | None:

@@ -360,12 +360,48 @@ def test_uneven_clocks_are_laid_on_even_times_and_nothing_is_compared_beyond_the
     assert not_driven == ([pytest.approx(12.0 - excitation_ends_s, abs=0.02)] if excitation_ends_s < 12 else [])
 
 
-def test_a_clock_that_loses_several_samples_in_a_row_is_refused_with_its_line(tmp_path: Path) -> None:
-    run = bench_of_a_part(tmp_path)
+@pytest.mark.parametrize(("fault", "jitter", "lost", "why"), [
+    ("gaps", 0.0, 102, "without a reading"), ("gaps", 0.3, 102, "without a reading"),
+    ("clipped", 0.0, 0.09 * len(TIME_S), "at an end of the sensor's range, but as bounds")])
+def test_what_drops_out_or_is_clipped_changes_no_result(
+        fault: str, jitter: float, lost: float, why: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Three drop-outs of 48 to 240 ms, also by a clock that is off by a third of a step, and a sensor that is at its
+    ends for a tenth of the time: what is found is right, and the same as by a whole record."""
+    bench, push, seen = ringing(6.0)
+    (tmp_path / "bench.yaml").write_text(bench.yaml.replace("2000.0", "1500 +- 30%").replace("6.0", "4 +- 50%"))
+    draw, kept = np.random.default_rng(7), np.ones(len(TIME_S), bool)
+    time_s = TIME_S + draw.uniform(-jitter, jitter, len(TIME_S)) / RATE_HZ * (TIME_S > 0)
+    seen_mps2 = Course(RATE_HZ, seen["accel_z_mps2"])(time_s) + draw.normal(0.0, 0.02, len(TIME_S))
+    whole = np.stack([time_s, seen_mps2], axis=1)
+    for first, end in ((700, 712), (1500, 1560), (2200, 2230)):
+        kept[first:end] = fault == "clipped"
+    end_mps2 = np.quantile(np.abs(seen_mps2), 0.91)
+    spoilt = np.stack([time_s, np.clip(seen_mps2, -end_mps2, end_mps2)], axis=1) if fault == "clipped" else whole[kept]
+    found = []
+    for name, table in (("whole", whole), ("spoilt", spoilt)):
+        run = written(tmp_path / name, {"accel_z_mps2": seen_mps2}, {"force_n": push(TIME_S)}, BODY)
+        np.savetxt(run / "drive.csv", table, "%.10g", ",", header="t_s,accel_z_mps2", comments="")
+        found.append(identified(capsys, tmp_path / "bench.yaml", run))
+    assert [one["amount"] for one in found[1]["left_out"] if one["why"] == why] == [pytest.approx(lost, rel=0.05)]
+    assert not [one for one in found[0]["left_out"] if one["why"] == why]
+    for name, true in {"stiffness_n_per_m": 2000.0, "damping_n_s_per_m": 6.0}.items():
+        by_whole, by_rest = (one["parameters"][name] for one in found)
+        error = found[1]["standard_errors"][name]
+        assert abs(by_rest - true) < 3 * error < 0.02 * true and abs(by_rest - by_whole) < 2 * error
+
+
+def test_a_record_that_is_mostly_clipped_or_mostly_not_there_is_refused(tmp_path: Path) -> None:
+    bench, push, seen = ringing(6.0)
+    (tmp_path / "bench.yaml").write_text(bench.yaml)
+    size = np.median(np.abs(seen["accel_z_mps2"])) / 2
+    run = written(tmp_path / "run", {"accel_z_mps2": np.clip(seen["accel_z_mps2"], -size, size)},
+                  {"force_n": push(TIME_S)}, BODY)
+    with pytest.raises(BadInput, match=r"found 7\d% of them at the largest and the smallest one exactly"):
+        ridelog.compare(tmp_path / "bench.yaml", [run])
     lines = (run / "drive.csv").read_text().splitlines()
-    (run / "drive.csv").write_text("\n".join(lines[:100] + lines[105:]) + "\n")
-    with pytest.raises(BadInput, match=r"drive.csv:101: expected samples evenly 0.004 s apart, found a step of 0.024"):
-        ridelog.compare(tmp_path / "part.yaml", [run])
+    (run / "drive.csv").write_text("\n".join(lines[:100] + lines[-100:]) + "\n")
+    with pytest.raises(BadInput, match=r"drive.csv:101: expected samples evenly 0.004 s apart, found a step of 11.2"):
+        ridelog.compare(tmp_path / "bench.yaml", [run])
 
 
 @pytest.mark.parametrize("damping", ["1500 +- 50%", pytest.param("unknown", marks=pytest.mark.slow)])

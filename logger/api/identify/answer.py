@@ -60,7 +60,7 @@ from logger.question import function
 from logger.report.quantities import known as known_number
 from logger.report.quantities import measured, unit_of
 from logger.runs import Run as Record
-from logger.runs import past_of, runs_left_out, zero_is_known
+from logger.runs import no_readings, past_of, runs_left_out, zero_is_known
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats import vehicle_file
 from logger.store.formats.drive_file import DRIVE, RUN
@@ -204,7 +204,8 @@ def _records(drives: Sequence[Run], question: IdentifyQuestion, vehicle: Vehicle
         samples = drive.accel_z_mps2 - zero
         records.append(Record(str(drive.path), drive.rate_hz, samples, drive.distance_m, drive.speed_mps,
                               Track(1.0, np.zeros(2)) if drive.track is None else drive.track, past_s,
-                              replace(drive.facts, signals=()), drive.marks()))
+                              replace(drive.facts, signals=()), drive.marks(),
+                              left_out=no_readings(drive.usable)))
     try:
         check_records(records)
     except UnusableRun as error:

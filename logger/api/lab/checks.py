@@ -18,7 +18,7 @@ import numpy as np
 from logger.api.vehicles import check_forces
 from logger.arrays import Array, Bools
 from logger.bounds import SPEED, time_hint
-from logger.dsp.channel_faults import goes_against, longest_still, share_at_ends
+from logger.dsp.channel_faults import at_ends, goes_against, longest_still
 from logger.dsp.repeated_samples import find_repeats, stretches_of
 from logger.dsp.whole_record import thinned
 from logger.errors import BadInput
@@ -39,6 +39,7 @@ from logger.lab.road_match import (
 )
 from logger.lab.selection.evidence import FALSE_ALARM
 from logger.lab.selection.holdout import ROUNDING
+from logger.left_out import LeftOut
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.roads.iri import likely_unit
@@ -50,6 +51,7 @@ from logger.runs import (
     Past,
     Run,
     Signal,
+    no_readings,
     past_of,
     zero_is_known,
 )
@@ -382,8 +384,8 @@ def of_rates(run: Run) -> Run:
         return run
     usable, main = run.usable, facts.main
     if is_place(main):
-        if usable is not None:  # what was not read spoils the rates beside it
-            usable = np.where(np.convolve(usable == NO_READING, np.ones(5), "same") > 0, NO_READING, usable)
+        if usable is not None:  # what was not read, or clipped, spoils the rates beside it
+            usable = np.where(np.convolve(usable != READING, np.ones(5), "same") > 0, NO_READING, usable)
         main = replace(main, measures="velocity")
         facts = replace(facts, step_mps2=None, range_mps2=None, noise_mps2=None)
     more = [rate(samples) if is_place(one) else samples for one, samples in zip(facts.signals, run.more, strict=True)]
@@ -420,7 +422,8 @@ def driven_stretches(drive: DriveOnRoad) -> list[Run]:
         driven = (time_s > drive.track.start_s - near_s) & (time_s < drive.track.end_s + near_s)
     parts = driven_parts(drive, driven)
     whole = len(parts) == 1 and parts[0] == slice(0, len(drive.time_s))
-    cut_s = (len(drive.time_s) - sum(part.stop - part.start for part in parts)) / drive.rate_hz
+    cut = LeftOut((len(drive.time_s) - sum(part.stop - part.start for part in parts)) / drive.rate_hz, "s",
+                  "in which nothing drove it or nothing was read")
     def main(part: slice) -> Array:
         samples = drive.accel_z_mps2[part]
         return samples if zero_is_known(drive.facts.main, drive.track) else samples - samples.mean()
@@ -429,7 +432,8 @@ def driven_stretches(drive: DriveOnRoad) -> list[Run]:
                 f"{drive.path} ({drive.time_s[part.start]:.0f} to {drive.time_s[part.stop - 1]:.0f} s)",
                 drive.rate_hz, main(part), drive.distance_m[part], drive.speed_mps[part],
                 drive.track.begun(part.start / drive.rate_hz), past_of(drive.track).value, facts=drive.facts,
-                usable=drive.marks(part), more=_more(drive, part), cut_s=cut_s if part is parts[0] else 0.0)
+                usable=drive.marks(part), more=_more(drive, part),
+                left_out=(*([cut] if part is parts[0] else []), *no_readings(drive.marks(part))))
             for part in parts]
 
 
@@ -477,13 +481,15 @@ def check_channels(drive: Drive, file: Path, vehicle: Vehicle) -> None:
     if not isinstance(track, Excitation):
         return
     read = [(main, drive.accel_z_mps2), *((one, drive.more[one.name]) for one in drive.facts.signals)]
-    for signal, samples in read if drive.usable is None else []:
-        if (share := share_at_ends(samples)) > _CLIPPED_SHARE:
+    whole = np.full(len(drive.time_s), True) if drive.usable is None else drive.usable == READING
+    to_judge = read if drive.usable is None or drive.guessed else []
+    for signal, samples in ((signal, every[whole]) for signal, every in to_judge):
+        if (share := float(at_ends(samples).mean())) > _CLIPPED_SHARE:
             raise BadInput(f"{file}: {signal.name}: expected readings, found {share:.0%} of them at the largest and "
                            "the smallest one exactly, as from a saturated amplifier: set its range wider, or add a "
                            "column usable, 2 there and 1 elsewhere (1 everywhere if this is right)")
         if signal.measures == "force" and (still := longest_still(samples, drive.rate_hz)):
-            from_s, to_s = (float(drive.time_s[min(one, len(samples) - 1)]) for one in still)
+            from_s, to_s = (float(drive.time_s[whole][min(one, len(samples) - 1)]) for one in still)
             raise BadInput(f"{file}: {signal.name}: expected readings, found {samples[still[0]]:g} from {from_s:.4g} "
                            f"to {to_s:.4g} s, as from a disconnected cable: add a column usable, 0 there and 1 "
                            "elsewhere (1 everywhere if this is right)")

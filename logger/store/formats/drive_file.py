@@ -22,6 +22,7 @@ import yaml
 
 from logger import bounds
 from logger.arrays import Array
+from logger.dsp.channel_faults import at_ends
 from logger.errors import BadInput
 from logger.files import file_in, read_bounded, write_text
 from logger.profiles.excitation import FEWEST, AppliedForce, Excitation
@@ -230,6 +231,7 @@ class Drive:
     distance_m     where the front tires stand on the track [m]; on a rig 0
     lat_deg, lon_deg    None where they were not recorded
     usable         0 where there was no reading, 1 where there was, 2 where it was clipped; None: all are readings
+    guessed        whether that was found, as its file says nothing of it
     facts          what is known of the record
     more           columns (n,) of the signals that ``facts`` has, by name
     """
@@ -243,6 +245,7 @@ class Drive:
     lat_deg: Array | None
     lon_deg: Array | None
     usable: Array | None = field(default=None, kw_only=True)
+    guessed: bool = field(default=False, kw_only=True)
     facts: RecordFacts = field(default=UNKNOWN, kw_only=True)
     more: Mapping[str, Array] = field(default_factory=dict, kw_only=True)
 
@@ -284,7 +287,7 @@ def drive_in(folder: Path, timed: bool) -> Drive:
         check_columns(folder, columns, (*COLUMNS, *PLACE, USABLE))
         facts = _measured(facts, columns) if timed else facts
     names = tuple(one.name for one in facts.signals)
-    return replace(read_drive(folder / DRIVE, timed, names, facts.main.name), path=folder, facts=facts)
+    return replace(read_drive(folder / DRIVE, timed, names, facts.main), path=folder, facts=facts)
 
 
 def _measured(facts: RecordFacts, columns: Sequence[str]) -> RecordFacts:
@@ -329,17 +332,31 @@ def excitation_beside(drive: Drive) -> Excitation:
     return replace(found, start_s=found.start_s - first_s)
 
 
-def read_drive(path: Path | str, timed: bool = False, more: Sequence[str] = (), main: str = VERTICAL) -> Drive:
+def read_drive(path: Path | str, timed: bool = False, more: Sequence[str] = (), main: Signal = ACCELERATION) -> Drive:
     """Read a ``drive.csv``, that of a rig (``timed``) without speed and distance, and ``more`` of its columns; ``main``
-    in place of the sensor's acceleration. Times and errors as in ``read_run``."""
-    file, columns = read_columns(path, timed, more, main)
-    if timed and USABLE not in columns:
-        rate_hz, laid = laid_evenly(columns[TIME], np.stack(list(columns.values()), axis=1), file)
+    in place of the sensor's acceleration. Rows that a rig's leaves out are no readings, and what is at an end of the
+    sensor's range is clipped, if the file does not say what is usable. Times and errors as in ``read_run``."""
+    file, columns = read_columns(path, timed, more, main.name)
+    guessed = timed and USABLE not in columns
+    if timed:
+        usable = _marks(columns[VERTICAL], main) if guessed else columns.pop(USABLE)
+        rate_hz, laid, usable = laid_evenly(columns[TIME], np.stack(list(columns.values()), axis=1), usable, file)
         columns = dict(zip(columns, laid.T.copy(), strict=True))
+        if not guessed or (usable != READING).any():
+            columns[USABLE] = usable
     else:
         rate_hz = even_rate_hz(columns[TIME], file)
-    return replace(drive_of(path, rate_hz, columns), facts=facts_beside(path),
+    return replace(drive_of(path, rate_hz, columns), guessed=guessed, facts=facts_beside(path),
                    more={name: columns[name] for name in more})
+
+
+def _marks(samples: Array, main: Signal) -> Array:
+    """What samples (n,) are, clipped or readings; where most of them would be clipped, or others may well stay where
+    they are, as places and the force of friction do, they are readings."""
+    if main.measures not in ("acceleration", "velocity"):
+        return np.full(len(samples), READING)
+    clipped = at_ends(samples)
+    return np.where(clipped & (2 * np.count_nonzero(clipped) < len(clipped)), CLIPPED, READING)
 
 
 def drive_of(path: Path | str, rate_hz: float, columns: Mapping[str, Array]) -> Drive:

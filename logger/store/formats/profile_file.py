@@ -54,7 +54,7 @@ from logger.store.formats.csv_table import (
     shown,
     taken,
 )
-from logger.store.formats.record_file import MAX_BYTES, TIME, laid_evenly
+from logger.store.formats.record_file import MAX_BYTES, TIME, even_rate_hz, laid_evenly
 from logger.units import FOOT_M
 
 MAX_CHANNELS = 1000
@@ -508,7 +508,10 @@ def read_excitation(path: Path | str, forces: Sequence[AppliedForce] = ()) -> Ex
     columns = {name: taken(FORCE if name in pushes else ELEVATION, name, column, file)
                for name, column in zip(names[1:], table.T[1:], strict=True)}
     heights = tuple(name for name in (*EXCITATION_COLUMNS, PART_COLUMNS[1]) if name in columns)
-    rate_hz, laid = laid_evenly(table[:, 0], np.stack([columns[name] for name in (*heights, *pushes)], axis=1), file)
+    rate_hz, laid, read = laid_evenly(table[:, 0], np.stack([columns[name] for name in (*heights, *pushes)], axis=1),
+                                      np.ones(len(table)), file)
+    if not read.all():
+        even_rate_hz(table[:, 0], file)
     moved = laid[:, :len(heights)] if heights else np.zeros((len(laid), 1))
     return Excitation(rate_hz, moved if len(heights) > 1 else moved[:, 0].copy(), float(table[0, 0]),
                       laid[:, len(heights):] if pushes else None, tuple(known[name] for name in pushes),

@@ -14,8 +14,10 @@ import numpy as np
 
 from logger import bounds
 from logger.arrays import Array
+from logger.dsp.whole_record import mean_rate_hz, on_even_grid
 from logger.errors import BadInput
 from logger.files import file_in, read_bounded
+from logger.runs import EVEN_SAMPLES, NO_READING
 from logger.store.formats.csv_table import parse_columns, place, taken
 
 DRIVE_NAME = "drive.csv"
@@ -111,18 +113,27 @@ def even_rate_hz(t_s: Array, file: str, mend: str = "") -> float:
     return 1.0 / step_s
 
 
-def laid_evenly(t_s: Array, columns: Array, file: str) -> tuple[float, Array]:
-    """A rate, and columns (n, c) at even times: as they are, or, where a clock is uneven but no two samples in a row
-    are lost, laid on even times. BadInput as ``even_rate_hz``."""
+def laid_evenly(t_s: Array, columns: Array, usable: Array, file: str) -> tuple[float, Array, Array]:
+    """A rate, columns (n, c) at even times and how ``usable`` (n,) they are there: as they are, or, where a clock is
+    uneven or rows were left out, laid on even times, of which those in holes have no reading. BadInput as
+    ``even_rate_hz``, where fewer than half of the samples are there too."""
     steps = np.diff(t_s)
-    if (steps <= 0).any() or (_off_even(t_s) <= _tolerance_s(float(steps.mean()))).all() or (
-            steps.max() > HOLE_STEPS * np.median(steps)):
-        return even_rate_hz(t_s, file), columns
-    from logger.dsp.whole_record import mean_rate_hz, on_even_grid
-
+    if (steps <= 0).any() or (_off_even(t_s) <= _tolerance_s(float(steps.mean()))).all():
+        return even_rate_hz(t_s, file), columns, usable
     taken(bounds.TIME, TIME, t_s, file)
     rate_hz = mean_rate_hz(t_s)
-    return rate_hz, on_even_grid(t_s, columns, rate_hz, rate_hz)
+    rows = np.append(0.0, np.cumsum(np.rint(steps * rate_hz)))
+    if 2 * len(rows) < rows[-1]:
+        even_rate_hz(t_s, file)
+    even_s = np.interp(rows, rows[[0, -1]], t_s[[0, -1]])
+    if (np.abs(t_s - even_s) <= _tolerance_s(1 / rate_hz)).all():  # but for rows that were left out
+        t_s, rate_hz = even_s, float(rows[-1] / (t_s[-1] - t_s[0]))
+    laid = on_even_grid(t_s, columns, rate_hz, rate_hz)
+    at = np.interp(t_s[0] + np.arange(len(laid)) / rate_hz, t_s, np.arange(len(t_s)))
+    beside = np.array([np.floor(at + EVEN_SAMPLES), np.ceil(at - EVEN_SAMPLES)], int)
+    in_hole = np.diff(t_s[beside], axis=0)[0] > HOLE_STEPS * np.median(steps)
+    marks = usable[beside]
+    return rate_hz, laid, np.where(in_hole | (marks == NO_READING).any(axis=0), NO_READING, marks.max(axis=0))
 
 
 def _off_even(t_s: Array) -> Array:
