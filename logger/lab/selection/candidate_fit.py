@@ -95,18 +95,23 @@ def refine(score: float, one: CandidateFit, worth: float = 0.0, rounds: int = 3)
     return CandidateFit.of(score, fit(one.found.linearise(), one.found.numbers, rounds, worth))
 
 
-def with_refinements(score: float, one: CandidateFit) -> CandidateFit:
-    """The fit of an effect in its plain form, or one with its refinements that begins there, if that explains most of
-    what the plain one leaves, and of what one that begins where it ended leaves, too."""
-    effect = one.effect
-    if not effect.refinements or not one.chosen.is_plain:
+def with_refinements(score: float, one: CandidateFit, place: int = -1) -> CandidateFit:
+    """The fit with an effect, the last or that at another place, in its plain form, or one with its refinements that
+    begins there, if that explains most of what the plain one leaves, and of what one that begins where it ended leaves,
+    too."""
+    effect = one.found.state.effects[place].effect
+    if not effect.refinements or not one.found.state.effects[place].is_plain:
         return one
 
     def fitted(found: CandidateFit, ways: Iterable[Mapping[str, float]]) -> CandidateFit:
         posterior, state, numbers = found.found.posterior, found.found.state, found.found.numbers
-        begun = [LinearModel(posterior, posterior.state_at((*state.effects[:-1], replace(found.chosen, values={
-            **found.chosen.values, **{name: way[name] for name in effect.refinements}})), state.logs, state.record,
-            state.size), numbers) for way in ways]
+        begun = []
+        for way in ways:
+            effects = list(state.effects)
+            effects[place] = replace(effects[place], values={
+                **effects[place].values, **{name: way[name] for name in effect.refinements}})
+            begun.append(LinearModel(posterior, posterior.state_at(effects, state.logs, state.record, state.size),
+                                     numbers))
         return CandidateFit.of(score, fit(min(begun, key=lambda each: each.score), numbers))
 
     try:
@@ -116,7 +121,7 @@ def with_refinements(score: float, one: CandidateFit) -> CandidateFit:
     except NotSimulated:
         return one
     better = refined.gain > one.gain + INDISTINGUISHABLE and refined.hold_out.explains_most_beyond(one.hold_out)
-    return refined if better and not refined.chosen.is_refined_too_far else one
+    return refined if better and not refined.found.state.effects[place].is_refined_too_far else one
 
 
 def refine_to_the_end(score: float, one: CandidateFit) -> CandidateFit:

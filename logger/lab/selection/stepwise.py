@@ -140,6 +140,9 @@ class Likelihood(Protocol[M, P, F]):
     def with_effect(self, one: F) -> M:
         """The model with one more effect, fitted in full."""
 
+    def refined_beside(self, now: M, name: str) -> M:
+        """The model, or one with refinements of one of its effects, where they explain most of what it leaves."""
+
     def chance(self, one: Chosen, gain: float, base: M, candidates: int) -> float:
         """Probability, at most, that noise alone gains as much over a model with any of so many candidates."""
 
@@ -201,6 +204,12 @@ class MeasuredRoad:
         """The model with the effect, its runs aligned again."""
         found = with_refinements(one.found.score + one.gain, one).found
         return Baseline.of(fit(align(found.posterior, found.state), found.numbers))
+
+    def refined_beside(self, now: Baseline, name: str) -> Baseline:
+        """Begun where the model ended."""
+        plain = CandidateFit.of(now.score, now.linear)
+        refined = with_refinements(now.score, plain, names_of(now).index(name))
+        return Baseline.of(refined.found.linearise()) if refined.hold_out.explains_most_beyond(now.hold_out) else now
 
     def chance(self, one: Chosen, gain: float, base: Baseline, candidates: int) -> float:
         """By the evidence and by the likelihood."""
@@ -315,6 +324,9 @@ class Search(Generic[M, P, F]):
                 if (best := self._simplest(under, tried)) is not None:
                     now = under
                     steps.append((names_of(now)[-1], now.hold_out))
+            grown = None
+            if best is None and (together := self._with_refinements(now, tried)) is not None:
+                best, grown = together
             if best is None:
                 other = self._reconsidered(now, tried)
                 if other is now:
@@ -323,7 +335,7 @@ class Search(Generic[M, P, F]):
                 continue
             self.progress(f"{best.effect.name} is missing; fitting the model with it")
             self._rivals[best.effect.name] = self._rivals_of(now, best.gain, best.effect.name, tried)
-            now = self._reconsider(self.likelihood.with_effect(best), best.effect.name, now)
+            now = self._reconsider(grown or self.likelihood.with_effect(best), best.effect.name, now)
             *earlier, added = names_of(now)[self.present:]
             last = UNTRIED
             steps.append((added, now.hold_out))
@@ -349,6 +361,18 @@ class Search(Generic[M, P, F]):
         wider._promising |= self._promising
         known = wider.round(now, more, beside=begun.last) if begun.last.on is now else None
         return wider, wider.go_on(replace(begun, now=now, first=first), known)
+
+    def _with_refinements(self, now: M, tried: SearchRound[P, F]) -> tuple[F, M] | None:
+        """The best of the effects that gain so little that they may imitate something, and the model with it, where
+        that and refinements of those before it together explain most of what is left; None: they do not."""
+        best = next((one for one in tried.fits if self.may_imitate(now, one)), None)
+        plain = [one.effect.name for one in now.effects[self.present:] if one.effect.refinements and one.is_plain]
+        if best is None or not plain:
+            return None
+        grown = self.likelihood.with_effect(best)
+        for name in plain:
+            grown = self.likelihood.refined_beside(grown, name)
+        return (best, grown) if self.likelihood.explains_most(now, grown) else None
 
     def _reconsidered(self, now: M, tried: SearchRound[P, F]) -> M:
         """The model with others in the place of its effects, where what is left is within sensors' calibration and an

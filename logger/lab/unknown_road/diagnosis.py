@@ -254,6 +254,10 @@ class UnmeasuredRoad:
         """Whether a fit is at an end of its range, or predicts drives by the others worse."""
         return one.chosen.at_bound or one.model.hold_out.error > base.hold_out.error
 
+    def refined_beside(self, now: RoadModel, name: str) -> RoadModel:
+        """Never: most of the power is the road's."""
+        return now
+
     def leaves_noise(self, there: RoadModel | RoadCandidate) -> bool:
         """Never: a colour of the noise is not told from a road."""
         return False
