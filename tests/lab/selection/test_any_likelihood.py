@@ -10,7 +10,7 @@ import pytest
 
 from logger.lab.selection.evidence import IMITATION, probability_by_chance
 from logger.lab.selection.holdout import HoldOut
-from logger.lab.selection.stepwise import Progress, Search, SearchEffort, names_of
+from logger.lab.selection.stepwise import Progress, Search, SearchEffort
 from logger.vehicle.effect import Chosen, Effect, Misalignment, chosen
 
 from ...support.lab.secret_runs import EFFECTS
@@ -28,7 +28,7 @@ class Made:
 
     @property
     def score(self) -> float:
-        return -sum(WORTH[one] for one in names_of(self))
+        return -sum(WORTH[one.effect.name] + 100.0 * (not one.is_plain) for one in self.effects)
 
     @property
     def explanation(self) -> float:
@@ -86,6 +86,11 @@ class MadeUp:
     def with_effect(self, one: Tried) -> Made:
         return one.model
 
+    def refined_beside(self, now: Made, name: str) -> Made:
+        by_name = {one.effect.name: one for one in now.effects}
+        refined = replace(by_name[name], values={**by_name[name].values, "static_to_sliding_ratio": 1.5})
+        return replace(now, effects=tuple({**by_name, name: refined}.values()))
+
     def chance(self, one: Chosen, gain: float, base: Made, candidates: int) -> float:
         return probability_by_chance(gain, candidates)
 
@@ -96,7 +101,8 @@ class MadeUp:
         return False
 
     def explains_most(self, without: Made, there: Made | Tried) -> bool:
-        return False
+        model = there.model if isinstance(there, Tried) else there
+        return len(model.effects) > len(without.effects) and any(not one.is_plain for one in model.effects)
 
     def is_within_calibration(self, without: Made) -> bool:
         return False
@@ -148,6 +154,18 @@ def test_what_gains_a_tenth_of_what_is_left_may_only_imitate(to_explain: float, 
     assert ("sensor_offset" in found.gains) == named
     undecided = [one.effect.name for one in found.last.fits if sought.may_imitate(found.now, one)]
     assert undecided == ([] if named else ["sensor_offset"])
+
+
+@pytest.mark.parametrize("friction", [True, False])
+def test_what_seems_to_imitate_is_found_where_it_shows_refinements_of_what_was_found_before(
+        friction: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    known = "dry_friction" if friction else "sensor_gain"
+    monkeypatch.setitem(WORTH, known, 700.0)
+    sought = search()
+    sought.effects = [EFFECTS[known], EFFECTS["sensor_offset"]]
+    found = sought.run(Made(explains=610.0))
+    assert list(found.gains) == [known, "sensor_offset"][: 1 + friction]
+    assert [one.is_plain for one in found.now.effects] == [False, True][-1 - friction:]
 
 
 @pytest.mark.parametrize("later", WORTH)
