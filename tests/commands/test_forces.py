@@ -643,7 +643,9 @@ def test_a_force_that_gives_before_it_slides_is_no_delay(slides_n: float, late_s
     assert main(["diagnose", "--vehicle", str(tmp_path / "part.yaml"), str(run)]) == 0
     said = " ".join(capsys.readouterr().out.split())
     known = {"damper_blow_off", "dry_friction", "hysteresis", "time_offset", "top_mount_compliance"}
-    assert {name for name in known if f"{name} is missing" in said} == names
+    # Far below its cut-off a low-pass of a load cell is a delay.
+    assert {name for name in known if f"{name} is missing" in said
+            or f"Either {name} or sensor_bandwidth is missing" in said} == names
     assert "natural frequencies" not in said and "drive one bump" not in said
 
 
