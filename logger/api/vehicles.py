@@ -73,8 +73,9 @@ class Model(vehicle_file.CarModel, Shown):
 
         BadInput for an effect or a parameter that there is not, or that this car cannot have.
 
-        >>> read_vehicle("rav4-2009").with_effect("dry_friction", friction_force_n=80.0).effects[0].values
-        {'friction_force_n': 80.0, 'transition_velocity_m_per_s': 0.0, 'axle': 0.0}
+        >>> rubbing = read_vehicle("rav4-2009").with_effect("dry_friction", friction_force_n=80.0)
+        >>> rubbing.effects[0].values["friction_force_n"]
+        80.0
         """
         effect, file = effect_file.effect_named(name)
         try:

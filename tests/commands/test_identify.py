@@ -230,7 +230,7 @@ def test_the_number_of_an_effect_beside_one_of_the_car(rubbing_run: str, tmp_pat
     assert main(asked) == 0
     text = capsys.readouterr().out
     assert f"{FRICTION} " in text
-    assert "starts end at the same place" in text
+    assert "starts end at the same values" in text
     assert "These runs determine every free parameter." in text
 
 

@@ -119,7 +119,8 @@ OWN = [
     Fault("adxl345", "high byte first", fed(lambda data: data[:2] + bytes(
         data[2 + (k ^ 1)] for k in range(len(data) - 2))), data_sheet_examples_decode),
     Fault("adxl345", "twice the scale", value(adxl345, "COUNTS_PER_G", 128), samples_are_what_it_felt),
-    Fault("adxl345", "ten bits in place of full resolution", value(adxl345, "SIXTEEN_G", 0), samples_are_what_it_felt),
+    Fault("adxl345", "ten bits in place of full resolution", value(adxl345, "FORMAT", replace(
+        adxl345.FORMAT, fields={**adxl345.FORMAT.fields, "range": (5, 4)})), samples_are_what_it_felt),
     Fault("adxl345", "code of another rate", value(adxl345, "RATE_CODES", {200: 0x0C, 400: 0x0C, 800: 0x0D}),
           samples_are_what_it_felt),
     Fault("adxl345", "settings never checked", nothing_checked, lost_settings_are_noticed),

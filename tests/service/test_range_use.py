@@ -90,4 +90,4 @@ def test_status_says_it_of_a_drive_at_8_g_that_needs_2(tmp_path: Path) -> None:
     car.sample = lambda second: bytes((0, 0, 4 * (4 + car.rng.randrange(-1, 2))))
     car.speed_mps = 20.0
     status = car.drive(3 + 1.2 * FEWEST_WINDOWS * 7.62 / 20.0)
-    assert any("beyond a smaller range" in line and "set range_g: 2" in line for line in advice(status))
+    assert any("would have exceeded a smaller range" in line and "set range_g: 2" in line for line in advice(status))
