@@ -395,8 +395,9 @@ def hung(structure: Structure, mass: float, stiffness: float, damping: float, at
 
     def with_newcomer(matrix: Array, corners: Array, own: float) -> Array:
         """The matrix, with what the suspensions do along their new travel and the newcomer's own part."""
-        plain = np.pad(matrix - (structure.travel.T * corners) @ structure.travel, (0, 1))
-        return plain + (wider.T * corners) @ wider + own * np.outer(relative, relative)
+        with np.errstate(over="ignore", invalid="ignore"):  # a search tries sizes that nothing has
+            plain = np.pad(matrix - (structure.travel.T * corners) @ structure.travel, (0, 1))
+            return plain + (wider.T * corners) @ wider + own * np.outer(relative, relative)
 
     road = np.pad(structure.road, ((0, 1), (0, 0)))
     if structure.on_base:  # over which its place is counted
