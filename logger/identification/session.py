@@ -55,18 +55,19 @@ def located(vehicle: Vehicle, record: Run, road: RoadInput, part: str) -> float:
         raise ValueError(f"{part}: expected a drive over it, found a car that stands")
     if count > _MOST_PLACES:
         raise ValueError(f"{part}: expected a start_m, as {last_m - first_m:g} m are too long to look for it")
-    find = partial(_best_place, vehicle, record, road, part)
-    return find(find(np.linspace(first_m, last_m, max(count, 2))) + apart_m * np.linspace(-1, 1, _REFINED))
-
-
-def _best_place(vehicle: Vehicle, record: Run, road: RoadInput, part: str, places: Array) -> float:
-    """The place whose response, times the best factor above 0, leaves the least of the measurement. A linear car
-    answers an obstacle as on a flat road, from where it comes near until some time after it has passed."""
     without: dict[str, Any] = {part: None}
     bare = DriveModel(vehicle, [], [record], replace(road, **without)).predict(np.empty(0))[0]
     left = np.concatenate([np.zeros(record.first), record.kept_mps2 - bare])
     flat = replace(record, track=Track(1.0, np.zeros(2)), usable=None, skip_s=0.0)
-    way_m = record.distance_m / road.speed_scale
+    find = partial(_best_place, vehicle, flat, left, road, part)
+    return find(find(np.linspace(first_m, last_m, max(count, 2))) + apart_m * np.linspace(-1, 1, _REFINED))
+
+
+def _best_place(vehicle: Vehicle, flat: Run, left: Array, road: RoadInput, part: str, places: Array) -> float:
+    """The place whose response, times the best factor above 0, leaves the least of what is ``left`` (n,) of the
+    measurement without the obstacle. A linear car answers an obstacle as on a ``flat`` road, from where it comes near
+    until some time after it has passed."""
+    way_m = flat.distance_m / road.speed_scale
     structure, obstacle = structure_of(vehicle), road.obstacles[part]
     around_m = structure.contact_patch_m + float(np.abs(np.diff(way_m)).max())
     reach_m = around_m + obstacle.length_m + float(np.max(structure.behind_m))
@@ -77,7 +78,7 @@ def _best_place(vehicle: Vehicle, record: Run, road: RoadInput, part: str, place
         if not len(near):
             gains.append(0.0)
             continue
-        passed = slice(max(near[0] - 1, 0), near[-1] + round(_AFTER_S * record.rate_hz))
+        passed = slice(max(near[0] - 1, 0), near[-1] + round(_AFTER_S * flat.rate_hz))
         there: dict[str, Any] = {part: replace(obstacle, start_m=place)}
         felt = DriveModel(vehicle, [], [flat.part(passed)], RoadInput(speed_scale=road.speed_scale, **there)).predict(
             np.empty(0))[0]

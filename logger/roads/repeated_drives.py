@@ -238,16 +238,11 @@ def changes(passes: Passes, scatter: Scatter, split_s: float, length_m: float) -
 def _mean_change(passes: Passes, scatter: Scatter, split_s: float, length_m: float) -> tuple[float, float]:
     """The mean over cells that were passed in both periods, with its standard error: what is common to a drive does not
     fall with its cells; what is common to all is in it as far as it differs. Drives that have errors alike differ by
-    less, which is not counted here, as it is not in one cell. A cell counts by the length that both periods cover, in
-    both, as else how cells differ would be taken for a change."""
+    less, which is not counted here, as it is not in one cell."""
     if not len(passes.key):
         return float("nan"), float("nan")
     period = (passes.time_s >= split_s).astype(np.intp)
-    _, cell = np.unique(passes.key, return_inverse=True)
-    covered_m = np.zeros((2, cell.max() + 1))
-    np.maximum.at(covered_m, (period, cell), passes.known_m)
-    both = replace(passes, known_m=np.minimum(passes.known_m, covered_m.min(axis=0)[cell]))
-    found = _group_means(both, replace(scatter, alike=0.0), length_m, period)
+    found = _group_means(passes, replace(scatter, alike=0.0), length_m, period)
     change, common = (float(np.diff(one)[0]) for one in (found.mean, found.common))
     return change, float(np.sqrt(found.variance.sum() + common**2))
 
@@ -427,12 +422,17 @@ class _GroupMeans:
 
 
 def _group_means(passes: Passes, scatter: Scatter, cell_m: float, of: Ints) -> _GroupMeans:
-    """The means over the cells of each group, ``of`` the passes (p,): a cell as in ``way_means``."""
-    _, cell = np.unique(np.stack([of, passes.key]), axis=1, return_inverse=True)
+    """The means over the cells of each group, ``of`` the passes (p,): a cell as in ``way_means``, but in all groups by
+    the length that each of them covers, as else how cells differ would be taken for a difference of the groups."""
+    cells, cell = np.unique(np.stack([of, passes.key]), axis=1, return_inverse=True)
     cell = cell.ravel()
     weight = 1.0 / np.maximum(variances(passes, scatter), 1e-12)
-    length_m = np.zeros(cell.max() + 1)
-    np.maximum.at(length_m, cell, np.minimum(passes.known_m, cell_m))
+    own_m = np.zeros(cell.max() + 1)
+    np.maximum.at(own_m, cell, np.minimum(passes.known_m, cell_m))
+    _, place = np.unique(cells[1], return_inverse=True)
+    shared_m = np.full(place.max() + 1, np.inf)
+    np.minimum.at(shared_m, place, own_m)
+    length_m = shared_m[place]
     covered_m = np.zeros(of.max() + 1)
     np.add.at(covered_m, of[np.unique(cell, return_index=True)[1]], length_m)
     share = weight / np.bincount(cell, weight)[cell] * length_m[cell] / covered_m[of]

@@ -296,9 +296,9 @@ class Search(Generic[M, P, F]):
         with ThreadPoolExecutor(self.workers) as pool:
             one = self._screen_all(pool, base, [effect])[0]
         tries = self.likelihood.fitted_roughly(base.score, base, one, -np.inf)
-        said = [each for each in tries if all(each.chosen.values[name] == value for name, value in values.items())]
         if not tries:
             raise ValueError(f"expected a car that can be simulated with {effect.name}, found none at its usual values")
+        said = [each for each in tries if all(each.chosen.values[name] == value for name, value in values.items())]
         return self._best_of_each([self.likelihood.refined(base, each, 0.0) for each in said or tries])[0]
 
     def run(self, before: M) -> Selection[M, P, F]:
