@@ -70,7 +70,7 @@ class ComfortQuestion(Question):
       ridelog comfort seat.csv --daily-hours 4 --out ride.html
 
     FILE is CSV with the columns t_s and accel_z_mps2 (vertical, at the seat), evenly sampled at 80 Hz or more for 1 s
-    or longer, perhaps accel_x_mps2 and accel_y_mps2 as well. Its mean is taken off. The weighting is the standard's
+    or longer, optionally accel_x_mps2 and accel_y_mps2. comfort subtracts the mean. The weighting is the standard's
     formula, magnitude and phase, applied to the whole record by Fourier transform.
 
     comfort refuses a record with repeated samples, uneven times or values in g, and names the option that helps. It
@@ -102,19 +102,19 @@ class EstimateQuestion(LongQuestion):
     """The road's roughness from a drive's acceleration: IRI of windows with standard errors, and the road's profile.
 
     RUN is a folder with a drive.csv (t_s,accel_z_mps2,speed_mps,distance_m), or such a file. Where a profile.csv lies
-    in the folder, estimate compares with its exact IRI. Beside the estimates stands the limit: the accuracy of an
+    in the folder, estimate compares with its exact IRI. Beside the estimates it prints the limit: the accuracy of an
     estimator that knows the road's spectrum, the sensor's noise and the car exactly.
 
       ridelog estimate run --vehicle rav4-2009
       ridelog estimate drive.csv --vehicle mycar.yaml --step 0.613 --profile-out road.csv
 
-    A distance that GPS corrected may go back by up to 1 m; estimate then computes it again, as the integral of
-    speed_mps plus the moving mean over 2 s of the difference. It resamples other rates to 100 Hz. It refuses repeated
-    samples, uneven times and values in g, and names the option that helps.
+    GPS corrections may make the distance step back by up to 1 m: estimate then takes the integral of speed_mps, plus
+    the correction smoothed over 2 s. It resamples other rates to 100 Hz. It refuses repeated samples, uneven times and
+    values in g, and names the option that helps.
 
-    The profile holds only the wavelengths that the readings resolve: it is smoother than the road, and its own IRI too
-    low. A drive with holes makes several: P.csv, P-2.csv, P-3.csv. R2 depends on the range of IRI: the limit's R2 is
-    given for a mix of roads (IRI 1 to 10 m/km, as many of each), and for a road as rough as this one.
+    The profile holds only the wavelengths that the readings resolve: it is smoother than the road, and its IRI is too
+    low. A drive with gaps makes several: P.csv, P-2.csv, P-3.csv. R2 depends on the range of IRI: estimate gives the
+    limit's R2 for an even mix of roads (IRI 1 to 10 m/km), and for a road as rough as this one.
 
     In Python: raises BadInput for a drive that cannot be used, or of another road than its profile's, what makes the
     result wrong (repeated samples, gravity in g), and as ``read_run`` and ``read_vehicle``. Source: a smoother of the
@@ -207,21 +207,19 @@ class ModesQuestion(Question):
     """Natural frequencies, damping ratios and mode shapes of a vibration record, each with its standard deviation.
 
     FILE is CSV with t_s and one column per sensor, evenly sampled: a free decay (push, let go, record) or the response
-    to random forces; --input names a column with a force or motion that was measured with it. Nobody has to pick poles:
-    the order and the modes are chosen by rule, and what the record does not support is listed as rejected, with the
-    reason.
+    to random forces; --input names a column with the force or motion that drives it. You need not pick poles: modes
+    chooses the order and the modes by rule, and lists what it rejects, with the reason.
 
       ridelog modes push.csv --method era
       ridelog modes drive.csv --vehicle mycar.yaml
       ridelog modes --vehicle mycar.yaml --speed 20
 
     A drive needs the vehicle: the road, and the second axle that follows the first, put peaks into its spectrum that
-    are no modes. Its springs, dampers and masses are fitted to the spectrum, and the modes are those of the numbers
-    found; wheelbase, contact patch and the sensor's place stay as its file says. A record without speed_mps takes
-    --speed.
+    are no modes. modes fits its springs, dampers and masses to the spectrum and gives the modes of the fitted car;
+    wheelbase, contact patch and the sensor's position stay as in its file. A record without speed_mps needs --speed.
 
-    With --vehicle and no FILE they are those of a vehicle's file with its effects; the standard deviations follow from
-    the standard errors that the file carries. Nonlinear forces are linearised at a speed, on a road of IRI 2.5 m/km.
+    With --vehicle and no FILE, modes gives those of the vehicle's file with its effects, and standard deviations from
+    the standard errors in the file. It linearises nonlinear forces at a speed, on a road of IRI 2.5 m/km.
 
     In Python: the record has 100 samples or more; of a vehicle alone as ``vehicle_modes``. Raises BadInput for what
     does not fit together, a record that is too short for it, and as ``read_channels``. Source: P. van Overschee and
@@ -239,7 +237,7 @@ class ModesQuestion(Question):
         "CSV with t_s and one column per sensor", metavar="FILE", read=Path)]
     method: Annotated[str | None, Option(
         f"{', '.join(MODAL_METHODS)}: era for a free decay, ssi for a random response, n4sid with a measured input "
-        "(default: chosen from the record); decrement is Eq 5.2 of Blum 2015, for one mode of a free decay; none with "
+        "(default: chosen from the record); decrement is Eq 5.2 of Blum 2015, for one mode of a free decay; not with "
         "a vehicle", metavar="NAME", choices=MODAL_METHODS, check=_check_method)] = None
     _: KW_ONLY
     columns: Annotated[Sequence[str] | None, Option(
@@ -557,7 +555,7 @@ class LearnCarQuestion(LongQuestion):
     wheelbase_m: Annotated[float, Option("distance between the axles [m]", _WHEELBASE, "M")]
     _: KW_ONLY
     mass_kg: Annotated[float | None, Option(
-        "of the whole car as it is driven [kg] (default: a convention)", _CAR_MASS, "KG")] = None
+        "mass of the whole car as driven [kg] (default: a convention)", _CAR_MASS, "KG")] = None
     sensor: Annotated[float | None, Option(
         "ahead_m=M: how far the sensor sits ahead (+) of the car's middle, to 0.2 m (default: near its centre of "
         "gravity)", metavar="ahead_m=M", read=_ahead)] = None

@@ -47,7 +47,7 @@ class FixedPointQuestion(Question):
     _: KW_ONLY
     weighting: Annotated[str, Option("such as wd", metavar="NAME")] = "wk"
     rate_hz: Annotated[int, Option("its sampling rate", metavar="HZ")] = 100
-    data_bits: Annotated[int, Option("word of the data", metavar="32|16", check=_check_bits)] = 32
+    data_bits: Annotated[int, Option("word length of the data", metavar="32|16", check=_check_bits)] = 32
 
 
 FIXED_POINT = Verb(FixedPointQuestion, "logger.api.fixed_point:written")

@@ -80,10 +80,10 @@ class SectionsQuestion(LogsQuestion):
 
     Sections count from the beginning of each drive; the last one is cut short. A section's IRI is the mean of its
     windows, weighted by length; beside it stands how much of the section has an IRI. Its standard error includes the
-    errors that its windows share. Logs of older versions do not say how much that is: there it takes all as shared.
-    No mean includes rows flagged ``unsettled``.
+    errors that its windows share; logs of older versions do not tell them apart, and then it counts all errors as
+    shared. Means leave out rows flagged unsettled.
 
-    With --route they count by the measures of a line, for each pass over it and in either direction. The line may say
+    With --route, sections follow the kilometres of a line, for each pass over it in either direction. The line may have
     begin_km and end_km; points with a number km are its kilometre posts.
 
     In Python: raises BadInput for no log, none with an intact row, and a file that is no route.
@@ -94,10 +94,11 @@ class SectionsQuestion(LogsQuestion):
     """
 
     length: Annotated[str | float, Option(
-        "of a section with its unit, such as 0.1mi (23 CFR 490), 100ft, 1km (default: 100m)", metavar="LENGTH",
+        "length of a section with its unit, such as 0.1mi (23 CFR 490), 100ft, 1km (default: 100m)", metavar="LENGTH",
         read=str, check=length_of)] = 100.0
     units: Annotated[str | None, Option(
-        "of what is printed (default: us where the length is in miles or feet, else si)", choices=SYSTEMS)] = None
+        "units of the printed values (default: us where the length is in miles or feet, else si)",
+            choices=SYSTEMS)] = None
     route: Annotated[Path | str | None, Option(
         "measure sections along this line, for both directions", metavar="LINE.geojson", read=Path)] = None
     localized_m_per_km: Localized = None
@@ -125,7 +126,7 @@ class PassesQuestion(LogsQuestion):
     """
 
     length: Annotated[str | float, Option(
-        "of a piece of road with its unit, such as 25ft, 50m, 0.1mi (default: 25m)", metavar="LENGTH", read=str,
+        "length of a piece of road with its unit, such as 25ft, 50m, 0.1mi (default: 25m)", metavar="LENGTH", read=str,
         check=length_of)] = 25.0
     since: Annotated[str | None, Option(
         "rows from this day on (UTC), such as 2026-04-30; those without a date then do not count", metavar="DAY",
@@ -146,7 +147,7 @@ class ConvertQuestion(LogsQuestion):
 
     Each row of a log becomes a line on the map, from half-way to the row before to half-way to the next; a row without
     neighbours is a point, and one without a position has no place on it. Values keep their names and units; what is not
-    known is empty. GeoPackage and Parquet need the ``maps`` extra. The file is written whole, or not at all.
+    known is empty. GeoPackage and Parquet need pip install 'ridelog[maps]'. The file is written whole, or not at all.
 
       ridelog convert /media/RIDELOG --to drive.geojson
       ridelog convert /media/RIDELOG --smoothness ways.geojson --to review.geojson
@@ -161,7 +162,8 @@ class ConvertQuestion(LogsQuestion):
     True
     """
 
-    to: Annotated[Path | str, Option(f"file to write; its ending says what: {' '.join(FORMATS)}", metavar="FILE",
+    to: Annotated[Path | str, Option(f"file to write; its extension chooses the format: {' '.join(FORMATS)}",
+        metavar="FILE",
                                      read=Path)]
     smoothness: Annotated[Path | str | None, Option(
         "suggest OpenStreetMap's smoothness for the ways of this extract (with @id and highway)",
@@ -175,7 +177,7 @@ SECTIONS = Verb(SectionsQuestion, "logger.api.sections:sections_of", (Out(
 PASSES = Verb(PassesQuestion, "logger.api.passes:combined", (
     Out(f"write the means as {_TABLES}, or a page with map and curves (.html) or picture (.png .svg .pdf); may repeat",
         metavar="FILE", others=FORMATS),
-    Out("write the work list: waypoints (.gpx), or one of --out's other endings", "--visit", "FILE", FORMATS,
+    Out("write the work list: waypoints (.gpx), or one of the formats of --out", "--visit", "FILE", FORMATS,
         many=False, is_drawn=False)))
 CONVERT = Verb(ConvertQuestion, "logger.api.conversion:converted")
 
@@ -187,7 +189,7 @@ BY = ("segment", "section", "cell", "route")
 class IngestQuestion(LogsQuestion):
     """Add the intact rows of logs to a dataset of Parquet files. It skips rows that are there already; an ingest that
     was interrupted continues when you start it again. The dataset keeps a pseudonym of each car, the table beside it
-    (``DATASET.cars.csv``) its name.
+    (DATASET.cars.csv) its name.
 
       ridelog fleet ingest depot/ --to county --car-folders
       ridelog fleet ingest /media/RIDELOG --to county --car "van 7" --trim-m 200

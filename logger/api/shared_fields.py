@@ -36,16 +36,16 @@ TrackedRuns = Annotated[Runs, Argument(
     "folder with drive.csv and profile.csv (of a rig: excitation.csv)", metavar="RUN", read=Path, many=list)]
 Tolerance = Annotated[float | str | None, Option(
     "how well the vehicle's masses, springs and dampers are known where its file does not say: one standard "
-    f"deviation, as a share (default: {USUAL_TOLERANCE:g}; of lengths 0.02). {UNKNOWN}: nothing is known of any",
+    f"deviation, as a share (default: {USUAL_TOLERANCE:g}; of lengths 0.02). {UNKNOWN}: no parameter is known",
     metavar=f"SHARE|{UNKNOWN}", read=word_or_number(UNKNOWN, TOLERANCE),
     check=check_word_or_number(UNKNOWN, TOLERANCE))]
 Candidates = Annotated[Collection[str] | None, "names of the effects to be tried; None: all"]
 LowPass = Annotated[float | None, Option(
-    "leave out frequencies above it, for example 20, in the record and in the model; errors are of the rest (default: "
-    "all that the record holds; a record that somebody has low-passed is recognised, and said)", metavar="HZ")]
+    "leave out higher frequencies, for example above 20, in record and model; errors refer to the rest (default: "
+    "the whole record; ridelog recognises a low-passed record and says so)", metavar="HZ")]
 EffectFiles = Annotated[Sequence[Path | str], Option(
-    "a Python file with an effect of your own, to be tried as well; may repeat. Or the name of an effect of ridelog "
-    "that it tries elsewhere only, such as play",
+    "a Python file with an effect of your own, to be tried as well; may repeat. Or the name of one of ridelog's "
+    "effects that it would not try on these runs by itself, such as play",
     metavar="FILE.py", read=Path, many=list, flag="--effect-file")]
 
 
@@ -78,8 +78,8 @@ ResampleHz = Annotated[float | None, Option(
     "through an anti-alias filter. Without HZ (in Python 0): at its own rate, 100 Hz at least. The result says so",
     metavar="HZ", read=_rate_hz, bare=0.0)]
 ResampleM = Annotated[float | None, Option(
-    "for an unevenly spaced profile: interpolate it linearly, with a sample every M metres. This changes the IRI, and "
-    "the result says so",
+    "for an unevenly spaced profile: interpolate it linearly, with a sample every M metres. This changes the result, "
+    "which says so",
     metavar="M")]
 
 

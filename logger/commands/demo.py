@@ -434,8 +434,8 @@ def _name(dump: Path) -> str:
 
 
 _SHOWN = {
-    "lab": (lab, LAB_DIR, "show the lab instead: it finds what the model of a car lacks, from two drives"),
+    "lab": (lab, LAB_DIR, "show the lab: from two drives it finds what the model of a car lacks"),
     "field": (field, FIELD_DIR, "show the way from recordings in a car to a better IRI: four drives, two roads"),
-    "car": (car, CAR_DIR, "learn a car that nobody measured: four ordinary drives, its springs and dampers"),
+    "car": (car, CAR_DIR, "learn the springs and dampers of an unmeasured car from four ordinary drives"),
 }
 """What can be shown instead of a drive through the service, the folder for it, and its help."""

@@ -37,7 +37,7 @@ class ExtractQuestion(LongQuestion):
       ridelog extract --csv ride.csv --location gps.csv --out runs
       ridelog extract --csv log.csv --out runs --columns "t=time:ms,x=ax:g,y=ay:g,z=az:g,lat=lat,lon=lon,speed=v:km/h"
 
-    Exit status 1: one of several recordings could not be used; it is named, and the others are done.
+    Exit status 1: extract could not use one of several recordings; it names it and processes the others.
     """
 
     dumps: Annotated[list[Path] | tuple[Path, ...], Argument("recorded drive (.dump or .dump.gz)", metavar="DUMP",

@@ -19,7 +19,7 @@ _THIS_MACHINE = Path("/")
 
 @dataclass(frozen=True, kw_only=True)
 class InstallQuestion(Question):
-    """Set up user, groups, units, rules and settings, and start the service. Settings that were changed stay.
+    """Set up user, groups, units, rules and settings, and start the service. It keeps settings that you changed.
 
       sudo ridelog install --dry-run
       sudo ridelog install
@@ -28,12 +28,12 @@ class InstallQuestion(Question):
     """
 
     dry_run: Annotated[bool, Option("print each step and take none")] = False
-    root: Annotated[Path, Option("install into this folder instead, such as the mounted image of a card (default: /)",
+    root: Annotated[Path, Option("folder in place of /, such as the mounted image of a card",
                                  metavar="DIR", read=Path)] = _THIS_MACHINE
 
 
 class UninstallQuestion(InstallQuestion):
-    """Stop the service and take away the files that 'ridelog install' wrote, but for those that were changed since.
+    """Stop the service and remove the files that 'ridelog install' wrote, except those changed since.
 
       sudo ridelog uninstall --dry-run
       sudo ridelog uninstall

@@ -40,13 +40,14 @@ class StudyQuestion(Question):
     name: Annotated[str | None, Argument(
         "the study, as --list names it; dissertation, field (other papers) or roads (public records): all of that "
         "group; or all", metavar="NAME")] = None
-    folder: Annotated[Path | None, Argument("the data of a study that needs some", metavar="DIR", read=Path)] = None
-    listed: Annotated[bool, Option("list the studies there are", flag="--list")] = False
+    folder: Annotated[Path | None, Argument("folder of the data, for a study that needs some", metavar="DIR",
+        read=Path)] = None
+    listed: Annotated[bool, Option("list the studies", flag="--list")] = False
     quick: Annotated[bool, Option("a tenth of the draws and grid points")] = False
     out: Annotated[Path | None, Option(
         "also write a page with tables and pictures; for all: a folder of pages with index.html", metavar="PLACE",
         read=Path)] = None
-    vehicle: Annotated[str | None, Option("the car of a study of records of a road", metavar="NAME|FILE")] = None
+    vehicle: Annotated[str | None, Option("the car, for a study of road records", metavar="NAME|FILE")] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()

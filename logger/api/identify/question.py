@@ -41,33 +41,32 @@ def _obstacle(text: str) -> tuple[str, dict[str, float]]:
 
 @dataclass(frozen=True)
 class IdentifyQuestion(question.LongQuestion):
-    """Vehicle parameters from drives over known roads: a grey-box prediction-error fit.
+    """Fit vehicle parameters to drives over known roads: a grey-box prediction-error fit.
 
     Each RUN is a drive.csv, or a folder with drive.csv (t_s,accel_z_mps2,speed_mps,distance_m) and the profile.csv it
     was driven on, or, of a rig, with drive.csv (t_s,accel_z_mps2) and the excitation.csv
-    (t_s,elevation_m[,elevation_rear_m]) that drove it. What is free is named as in the vehicle's file; both.NAME is the
-    front and rear axle together. With nothing named, what the file calls unknown or writes as 2.45 +- 2% is found.
+    (t_s,elevation_m[,elevation_rear_m]) that drove it. --free names parameters as in the vehicle's file; both.NAME
+    means front and rear axle together. Without --free, identify fits what the file calls unknown or gives as 2.45 +-
+    2%.
 
       ridelog identify run --vehicle rav4-2009 --free sprung_mass_kg
       ridelog identify run1 run2 run3 --vehicle mycar.yaml --free sprung_mass_kg,both.suspension_damping_n_s_per_m \\
           --start sprung_mass_kg=700 --bounds sprung_mass_kg=500,1500 --out fitted.yaml
 
-    The numbers of an effect that the vehicle's file has are free by the effect's name:
+    To free a parameter of an effect in the vehicle's file, put the effect's name before it:
 
       ridelog identify run --vehicle mycar.yaml --free sprung_mass_kg,dry_friction.friction_force_n
 
-    What is not known of the road can be free as well: a bump (Eq 4.41 of Blum 2015) or a step of which only the kind is
-    known, and the scale of the recorded speed. A run then needs no profile.csv; the road is flat but for the obstacle,
-    and its start is looked for where none is given. run2.NAME is that of one run, each.NAME one for every run (of a
-    single run, NAME).
+    Parameters of the road can be free as well: those of a bump (Eq 4.41 of Blum 2015) or a step, and the scale of the
+    recorded speed. A run then needs no profile.csv; the road is flat but for the obstacle, and identify searches for
+    its start if you give none. run2.NAME is the parameter of one run, each.NAME a separate one for every run.
 
       ridelog identify drive.csv --vehicle rav4-2009 --obstacle bump:height_m=0.15,width_m=2.6 --free bump.height_m
       ridelog identify drive.csv --vehicle rav4-2009 --obstacle step:start_m=50,height_m=-0.03 \\
           --free step.height_m,speed_scale
 
-    With no profile at all the road is taken for a random one of ISO 8608 (--unmeasured-road): of unknown roughness, of
-    waviness 2 or, with road.waviness free, of the one that is found. Drives over one road at different speeds say far
-    more (--same-road).
+    With no profile at all, --unmeasured-road assumes a random road of ISO 8608, of unknown roughness and of waviness 2
+    (fitted if you free road.waviness). Drives over one road at different speeds tell far more (--same-road).
 
       ridelog identify drive.csv --vehicle rav4-2009 --unmeasured-road --free sprung_mass_kg
       ridelog identify slow.csv fast.csv --vehicle mycar.yaml --same-road --free sprung_mass_kg,both.unsprung_mass_kg
@@ -88,10 +87,11 @@ class IdentifyQuestion(question.LongQuestion):
 
     vehicle: shared_fields.VehicleName
     runs: Annotated[shared_fields.Runs, question.Argument(
-        "folder with drive.csv and profile.csv (of a rig: excitation.csv), or a drive.csv; all of one sample rate",
+        "folder with drive.csv and profile.csv (of a rig: excitation.csv), or a drive.csv; all with the same sample "
+        "rate",
         metavar="RUN", read=Path, many=list)]
     free: Annotated[Sequence[str] | None, question.Option(
-        "what to find: names as in the vehicle's file, dry_friction.friction_force_n of an effect, bump.height_m, "
+        "parameters to fit: names as in the vehicle's file, dry_friction.friction_force_n of an effect, bump.height_m, "
         "step.start_m, speed_scale or road.waviness of the road (default: what the vehicle's file gives as unknown or "
         "with a tolerance, which is its prior, and its effects)", metavar="PARAM,...",
         read=shared_fields.names_of)] = None

@@ -63,7 +63,7 @@ class CompareQuestion(LabQuestion):
 
 @dataclass(frozen=True)
 class DiagnoseQuestion(LabQuestion):
-    """Which physical effect a vehicle's model lacks: every one that is known is tried, the evidence decides.
+    """Find which physical effect a vehicle's model lacks: diagnose tries every known effect, and the evidence decides.
 
     Each RUN is a folder as in ridelog compare.
 
@@ -72,12 +72,12 @@ class DiagnoseQuestion(LabQuestion):
 
     NRMSE is rms(measured - model) / rms(measured) on held-out stretches: diagnose holds out three sets in turn. It
     first refits the car's parameters (within --tolerance) and the distances (as far as the runs show them to be off),
-    so that no small mistake passes for an effect. It takes seconds to minutes, and the compiler of the ``lab`` extra.
+    so that no small error passes for an effect. It takes seconds to minutes and needs pip install 'ridelog[lab]'.
 
     With --same-road each RUN is a drive.csv, or a folder with one; diagnose does not read a profile.csv in it. The runs
     are drives over the same road at different speeds, with distances counted from the same place (to about 3 m). Runs
-    extracted without a profile count from where each began; diagnose aligns them by their positions. It refuses drives
-    over two roads. NRMSE is then that of each drive over the road estimated from the other drives.
+    extracted without a profile count from their own start; diagnose aligns them by their positions. It refuses drives
+    over two roads. NRMSE is then that of each drive over the road as estimated from the others.
 
     In Python: raises BadInput as ``compare``, for effects that there are not, and where the compiler is missing.
 
@@ -101,17 +101,16 @@ class DiagnoseQuestion(LabQuestion):
 
 @dataclass(frozen=True)
 class AddEffectQuestion(LabQuestion):
-    """Add a physical effect to a vehicle: fit it with the car's numbers on all of the runs, and show what that changed.
+    """Add a physical effect to a vehicle: fit it with the car's parameters to all runs, and show what that changed.
 
       ridelog add-effect dry_friction --vehicle mycar.yaml --out mycar-2.yaml run1 run2
       ridelog add-effect dry_friction+damper_asymmetry --vehicle mycar.yaml --out mycar-2.yaml run1 run2
       ridelog add-effect sensor_bandwidth:order=2,cutoff_hz=20 --vehicle mycar.yaml --out mycar-2.yaml run1 run2
       ridelog add-effect ./my_effect.py --vehicle mycar.yaml --out mycar-2.yaml run1 run2
 
-    Several effects are fitted together. The fit begins at the parameters that you give (PARAM=VALUE) and searches for
-    the others. The new vehicle file holds
-    the effects with their standard errors, the car's refitted parameters and the history of the model. The old file
-    stays as it is unless --out names it.
+    add-effect fits several effects together. The fit begins at the values that you give (PARAM=VALUE) and searches for
+    the other start values. The new vehicle file holds the effects with their standard errors, the refitted parameters
+    and the history of the model. The old file stays unchanged unless --out names it.
 
     In Python: raises BadInput as ``compare``, and for an effect that there is not, that the model has, or that cannot
     be there.
@@ -151,10 +150,10 @@ class LearnQuestion(LabQuestion):
       ridelog learn --vehicle mycar.yaml --out law.py --out law.html run1 run2
 
     First learn tries every known effect, as ridelog diagnose does. If these explain the residual, or nothing is
-    missing, it learns and writes nothing. Otherwise it tries families of laws (forces by travel and rate, of the tires,
-    with a memory, a mass on a spring, ...) by the same evidence, in which every parameter counts. It writes the law as
-    an effect of your own: one Python file that compare, simulate, diagnose --effect-file and add-effect read. It takes
-    minutes, and the compiler of the ``lab`` extra:
+    missing, it learns and writes nothing. Otherwise it tries families of laws (forces that depend on travel, rate or
+    tire deflection, hysteresis, a mass on a spring, ...) by the same evidence, which penalises each parameter. It
+    writes the law as an effect of your own: one Python file that compare, simulate, diagnose --effect-file and
+    add-effect read. It takes minutes and needs pip install 'ridelog[lab]'. Then:
 
       ridelog add-effect ./law.py --vehicle mycar.yaml --out with-law.yaml run1 run2
 
@@ -177,10 +176,10 @@ class LearnQuestion(LabQuestion):
 
 @dataclass(frozen=True)
 class PlanQuestion(LabQuestion):
-    """Before anybody drives: which physical effects runs, or planned drives, could show and distinguish, and which
-    drive would add most.
+    """Predict which physical effects runs, or planned drives, could show and distinguish, and which further drive would
+    add most.
 
-    Each RUN is a folder as in 'ridelog compare'. Planned drives go over all of a profile, one at each speed, with 100
+    Each RUN is a folder as in 'ridelog compare'. Planned drives cover a whole profile, one at each speed, with 100
     samples a second and for 5 s or longer.
 
       ridelog plan --vehicle mycar.yaml --profile road.csv --speed 8 --speed 15
@@ -188,7 +187,7 @@ class PlanQuestion(LabQuestion):
 
     Detectability and isolability are in standard deviations, for each effect at its usual strength, with the car's
     parameters and the distances free within their tolerance. plan also tries further drives over the known road: other
-    speeds, a speed bump or a plank, a second sensor. It takes the compiler of the ``lab`` extra.
+    speeds, a speed bump or a plank, a second sensor. It needs pip install 'ridelog[lab]'.
 
     In Python: raises BadInput as ``diagnose``, where there is neither a run nor a planned drive, and for a drive that
     is shorter than 5 s.
@@ -205,13 +204,13 @@ class PlanQuestion(LabQuestion):
         "folder with drive.csv and profile.csv (of a rig: excitation.csv)", metavar="RUN", read=Path, many=list)] = ()
     _: KW_ONLY
     profile: Annotated[Union["Wheelpaths", Path, str, None], question.Option(
-        "the road of planned drives, and of the next one (default: that of the longest run)", metavar="FILE",
+        "the road of planned and further drives (default: that of the longest run)", metavar="FILE",
         read=Path)] = None
     speeds_mps: Annotated[Sequence[float], question.Option(
-        "plan a drive over all of the profile at this speed [m/s]; may repeat", question.SPEED, "MPS", many=list,
+        "plan a drive over the whole profile at this speed [m/s]; may repeat", question.SPEED, "MPS", many=list,
         flag="--speed")] = ()
     noise_mps2: Annotated[float | None, question.Option(
-        "r.m.s. of the sensor's noise [m/s2] (default: that of the runs; without runs a usual one)", question.NOISE,
+        "r.m.s. of the sensor's noise [m/s2] (default: that of the runs; without runs 0.05)", question.NOISE,
         "MPS2")] = None
     step_mps2: Annotated[float, question.Option(
         "step to which the planned sensor rounds [m/s2]", question.ADDED, "MPS2")] = 0.0
@@ -228,15 +227,14 @@ class PlanQuestion(LabQuestion):
 
 @dataclass(frozen=True)
 class LabLoopQuestion(LabQuestion):
-    """The lab's whole loop: compare, diagnose, add what is missing, compare again, until nothing is.
+    """Compare, diagnose, add what is missing and compare again, until nothing is missing: the lab's whole loop.
 
       ridelog lab --vehicle mycar.yaml run1 run2
       ridelog lab --vehicle mycar.yaml run1 run2 --yes --out lab
 
     lab asks before it adds an effect: yes, no, or the name of another one; it adds six at most. If no effect explains
     the residual, it offers to learn a law, as ridelog learn does. DIR gets a vehicle file for each step (vehicle-1.yaml
-    ...), the law (law.py), and story.html with the whole story. It takes minutes, and the compiler of the ``lab``
-    extra.
+    ...), the law (law.py), and story.html with the whole story. It takes minutes and needs pip install 'ridelog[lab]'.
 
     In Python: raises BadInput as ``diagnose`` and ``add_effect``, for a folder that there cannot be, and for an answer
     that is no effect; OSError for files that cannot be written.
