@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import prod
@@ -80,14 +81,17 @@ def _shapes(one: Chosen) -> int:
 
 def fit_roughly(score: float, base: Baseline, screen: Screened, least: float = -np.inf) -> list[CandidateFit]:
     """Fit an effect from each of its trials, with the derivatives of the model without it; best first. A trial whose
-    car cannot be simulated, as its numbers were extrapolated too far, is left out.
+    car cannot be simulated, where it begins or ends, is left out: its numbers were extrapolated too far.
 
     score    of the model that gains are counted from
     least    gain of a trial below which it is no start, if it is not the first
     """
-    fits = (_rough_fit(score, base, trial) for place, trial in enumerate(screen.trials)
-            if not place or trial.gain > least)
-    return sorted((one for one in fits if one is not None), key=lambda one: -one.gain)
+    fits = []
+    for place, trial in enumerate(screen.trials):
+        if not place or trial.gain > least:
+            with suppress(NotSimulated):
+                fits.append(_rough_fit(score, base, trial))
+    return sorted(fits, key=lambda one: -one.gain)
 
 
 def refine(score: float, one: CandidateFit, worth: float = 0.0, rounds: int = 3) -> CandidateFit:
@@ -129,7 +133,7 @@ def refine_to_the_end(score: float, one: CandidateFit) -> CandidateFit:
     return CandidateFit.of(score, fit_to_the_end(one.found.linearise(), one.found.numbers))
 
 
-def _rough_fit(score: float, base: Baseline, trial: Trial) -> CandidateFit | None:
+def _rough_fit(score: float, base: Baseline, trial: Trial) -> CandidateFit:
     posterior, numbers = base.posterior, base.linear.numbers
     if trial.start is not None:
         linear, state = LinearModel(posterior, trial.start, numbers), trial.start
@@ -137,10 +141,7 @@ def _rough_fit(score: float, base: Baseline, trial: Trial) -> CandidateFit | Non
         linear = base.linear.hold_fixed(trial.one.effect.replaces)
         state = State((*base.state.effects, trial.one), trial.logs,
                       linear.state.record, linear.size, [])
-    try:
-        found = optimise_numbers(linear, state, free_parameters_of(state.effects))
-    except NotSimulated:
-        return None
+    found = optimise_numbers(linear, state, free_parameters_of(state.effects))
     one = CandidateFit.of(score, relinearise(posterior, found, linear.numbers, score))
     lost = one.found.score - base.score - len(free_parameters_of([one.chosen])) * float(np.log(posterior.freedom))
     return _fit_by_squares(score, base, state) if lost > min_gain(1) else one

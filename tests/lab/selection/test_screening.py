@@ -8,8 +8,11 @@ import numpy as np
 import pytest
 from scipy.signal import butter, sosfilt
 
+from logger.arrays import Array
 from logger.lab.diagnosis import refit
-from logger.lab.likelihood.posterior import Posterior
+from logger.lab.likelihood.linear_model import LinearModel
+from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.selection import candidate_fit
 from logger.lab.selection.candidate_fit import fit_roughly, refine
 from logger.lab.selection.evidence import min_gain
 from logger.lab.selection.screening import (
@@ -70,6 +73,22 @@ def test_the_effect_that_is_there_promises_most_and_what_a_fit_then_gains(slight
     assert fine.gain == pytest.approx(slight.score - fine.found.score)
     assert fine.chosen.effect is fine.effect is EFFECTS["sensor_offset"]
     assert fine.chosen.values["offset_m"] == pytest.approx(0.2, abs=0.1)
+
+
+def test_a_trial_that_ends_at_a_car_that_cannot_be_simulated_is_left_out(
+        slight: Baseline, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = screen(slight, EFFECTS["body_bending"], [STILL])
+    relinearised = candidate_fit.relinearise
+    left_out = found.trials[0].one.values["ends_move"]
+
+    def not_simulated(posterior: Posterior, state: State, numbers: list[Array], least: float) -> LinearModel:
+        if state.effects[-1].values["ends_move"] == left_out:
+            raise np.linalg.LinAlgError("Matrix is not positive definite")
+        return relinearised(posterior, state, numbers, least)
+
+    monkeypatch.setattr(candidate_fit, "relinearise", not_simulated)
+    fits = fit_roughly(slight.score, slight, found)
+    assert fits and all(one.chosen.values["ends_move"] != left_out for one in fits)
 
 
 @pytest.mark.slow
