@@ -209,7 +209,7 @@ class IioDecoder:
         step_mps2 = max(abs(scale) for scale in layout.scale)
         if step_mps2 > 2 * self._settings.noise_mps2 and self._settings.scale_mps2 is None:
             return (f"one step of {layout.name} is {step_mps2:.3g} m/s2, which hides smooth roads: set scale_mps2 to a "
-                    f"finer one (see in_accel_scale_available), or to {step_mps2:.6g}, so that it is reckoned with")
+                    f"finer one (see in_accel_scale_available), or to {step_mps2:.6g}, if you accept it")
         if self._dated is None:
             return ""
         return self._dated.doubt("Check the rate of its trigger (sampling_frequency), and what else keeps the computer "

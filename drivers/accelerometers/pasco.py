@@ -154,8 +154,8 @@ class PascoDecoder:
         """What is wrong with the samples that come, and what to do; empty: nothing."""
         usual = f"{self._profile.rate_hz:g}"
         if self._clock.refused_hz is not None:
-            return (f"it sends about {self._clock.refused_hz:.0f} samples a second, unsteadily or too few, where the "
-                    f"profile {self._profile.name} says {usual}: ridelog makes no rows from them. Set the device to "
+            return (f"it sends about {self._clock.refused_hz:.0f} samples a second, too few or unevenly, and the "
+                    f"profile {self._profile.name} expects {usual}: ridelog makes no rows from them. Set the device to "
                     f"{usual} a second, or find what loses them (lost lines: baud rate at both ends, cable, a busy "
                     "bridge)")
         if self._clock.too_many_lost:

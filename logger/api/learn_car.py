@@ -480,9 +480,9 @@ def _kept_lines(errors: Mapping[str, Any]) -> Iterator[str]:
     if not errors["drives"]:
         yield "Only one drive: give another, so that each can check the car learnt from the other."
         return
-    yield ("Check, each drive held out in turn: its spectra differ from the average car of this wheelbase by "
-           f"{errors['misfit_before']:.1f} times chance, from the car learnt from the other drives by "
-           f"{errors['misfit_after']:.1f} times (ideal: 1).")
+    yield ("Check: each drive in turn is compared with the car learnt from the others. The misfit of its spectra is "
+           f"{errors['misfit_after']:.1f} times that of chance (ideal: 1), and {errors['misfit_before']:.1f} times for "
+           "the average car of this wheelbase.")
 
 
 def _mass_line(question: LearnCarQuestion, mass: float) -> str:
@@ -501,8 +501,8 @@ def _warnings(problem: UnknownCar, car: LearnedCar, values: Mapping[str, float],
             yield (f"The {end} damping ratio of {values[name]:.2f} is that of a worn damper (new ones: 0.2 to 0.4): "
                    "have it checked.")
     if (off := misfit(problem, car.x)) > _MISFIT:
-        yield (f"The spectra differ {off:.1f} times as much as by chance from any car on two axles: was there a "
-               "trailer or a load that moved, is the sensor loose or on another axis?")
+        yield (f"No two-axle car explains the spectra (misfit {off:.1f} times that of chance): was there a trailer or "
+               "a shifting load, or is the sensor loose or on another axis?")
     if not car.is_converged:
         yield "The search did not converge: parameters may be off by more than their standard errors; give more drives."
 

@@ -253,7 +253,7 @@ def lines(found: CombinedDrives) -> list[str]:
     """For a person."""
     cells = len(found.iri.key)
     if not cells:
-        return ["No row has a place and an IRI with its standard error, so drives cannot be combined."]
+        return ["No row has a position and an IRI with its standard error, so drives cannot be combined."]
     changes = change_lines(found)
     return [*changes, *([""] if changes else []), *_summary(found), *_passes_visits(found)]
 
@@ -264,7 +264,8 @@ def _summary(found: CombinedDrives) -> Iterator[str]:
     mean, std = (float(np.mean(one)) for one in (found.iri.iri_m_per_km, found.iri.iri_std_m_per_km))
     yield (f"Mean IRI {mean:.2f} m/km over {counted(cells, 'piece')} of road ({found.length_m:g} m, one direction); "
            f"standard error of one piece {std:.2f} m/km")
-    yield f"From {counted(found.drives, 'drive')}; {found.placed:,} of {counted(found.windows, 'window')} have a place"
+    yield (f"From {counted(found.drives, 'drive')}; {found.placed:,} of {counted(found.windows, 'window')} "
+           "have a position")
     yield (f"More than one drive passed {several / cells:.0%} of the pieces; drives per piece: median "
            f"{np.median(drives):g}, largest {drives.max()}")
     if isfinite(found.scatter.drive):

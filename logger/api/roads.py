@@ -279,13 +279,15 @@ def iri_lines(result: ProfileIri, profile: Profile, name: str) -> list[str]:
         f"Ride: {ride_words(roughness)}",
         *([doubt] if (doubt := unit_doubt(_roughest(result))) else []),
         "", *_cut_short(result),
-        f"{'from m':>10} {'to m':>10}" + "".join(f" {_HEADS[key]:>10}" for key in whole) + f" m/km {'in/mi':>9}",
+        f"{'from m':>10} {'to m':>10} {'from ft':>9} {'to ft':>9}"
+        + "".join(f" {_HEADS[key]:>10}" for key in whole) + f" m/km {'in/mi':>9}",
     ]
     for number, window in enumerate(result.windows, start=1):
         start_m, end_m = (profile.start_m + m for m in (window.distance_start_m, window.distance_end_m))
         row = result.row(number)
         values = "".join(f" {value:10.3f}" for value in row.values())
-        printed.append(f"{start_m:10.2f} {end_m:10.2f}{values} {row[first] / INCH_PER_MILE_M_PER_KM:14.1f}"
+        printed.append(f"{start_m:10.2f} {end_m:10.2f} {start_m / FOOT_M:9.1f} {end_m / FOOT_M:9.1f}{values} "
+                       f"{row[first] / INCH_PER_MILE_M_PER_KM:14.1f}"
                        + ("   partial" if window.partial else ""))
     printed += ["", _of_profile(profile, name)]
     if profile.widest_step_m is not None:

@@ -62,18 +62,21 @@ class Sections(CommandResult):
     speed_mps: Array
     condition: npt.NDArray[np.str_]
     _drives: tuple[DriveSections, ...]
+    _units: DisplayUnits
 
     title: ClassVar[str] = "Sections"
 
     def charts(self) -> Sequence[Chart]:
         """The IRI of the sections along each drive."""
         found: list[Chart] = []
+        (way, way_m), (label, scale) = self._units.way, self._units.iri
         for one in self._drives:
             known = np.isfinite(one.figures.iri_m_per_km)
             if known.any():
                 middle_m = (one.figures.edges_m[:-1] + one.ends_m)[known] / 2
-                found.append(Curves(_title(one), "distance [m]", "IRI [m/km]", (
-                    Line("IRI", middle_m, one.figures.iri_m_per_km[known], one.figures.iri_std_m_per_km[known]),)))
+                found.append(Curves(_title(one), f"distance [{way}]", f"IRI [{label}]", (
+                    Line("IRI", middle_m / way_m, one.figures.iri_m_per_km[known] / scale,
+                         one.figures.iri_std_m_per_km[known] / scale),)))
         return found
 
     def write(self, path: Path, option: str = "--out") -> None:
@@ -103,7 +106,8 @@ def sections_of(question: SectionsQuestion) -> Sections:
         as_json(drives, length_m, localized_m_per_km) | left_out_json(left), length_m,
         np.repeat(np.arange(len(drives)), [len(one.condition) for one in drives]),
         _joined([one.edges_m[:-1] for one in figures]), _joined([one.ends_m for one in drives]), known_m, iri, std, a_w,
-        speed_mps, np.array([word for one in drives for word in one.condition], dtype=np.str_), drives)
+        speed_mps, np.array([word for one in drives for word in one.condition], dtype=np.str_), drives,
+        UNITS[units])
 
 
 sections = function("sections", SectionsQuestion, sections_of)

@@ -92,7 +92,7 @@ def first_look(data: bytes) -> list[str]:
     distances = repeat_distances(data)
     if distances:
         shown = ", ".join(f"{distance} ({share:.0%})" for distance, share in distances)
-        lines.append(f"Bytes come again most often after: {shown} bytes. The first is a guess at the frame length.")
+        lines.append(f"Bytes repeat most often after: {shown} bytes. The first is probably the frame length.")
     return lines
 
 

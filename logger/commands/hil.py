@@ -109,7 +109,7 @@ class PlayedDrive:
         """For a person."""
         lines = []
         if self.bridged:
-            lines.append(f"The {self.bridged}'s readings go as lines x,y,z in g: no port can stand in for its bus.")
+            lines.append(f"The readings of the {self.bridged} go out as lines x,y,z in g: no port can replace its bus.")
         if self.sent is not None:
             size = ", ".join(f"{count} bytes of {source}" for source, count in self.sent.size_bytes.items())
             half, most, longest = self.sent.late_ms

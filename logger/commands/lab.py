@@ -69,7 +69,7 @@ def _taking() -> Ask:
     def ask(given: Bench, name: str) -> str:
         nonlocal said
         if not said:
-            print("Nobody is at a terminal to be asked: what is found missing is added (as with --yes).",
+            print("There is no terminal to ask at: ridelog adds what it finds missing (as with --yes).",
                   file=sys.stderr)
         said = True
         return take(given, name)

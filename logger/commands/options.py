@@ -283,7 +283,7 @@ def write_result(paths: Sequence[Path], found: CommandResult, of: str) -> None:
 
 def _drawn(path: Path, charts: Sequence[Chart]) -> bytes:
     if not charts:
-        raise BadInput(f"--out {path}: expected a result with pictures, found one without; {PAGE} holds its words")
+        raise BadInput(f"--out {path}: this result has no pictures; {PAGE} holds its text")
     from logger.report.charts import drawn
 
     return drawn(charts, path)

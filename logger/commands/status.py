@@ -99,12 +99,12 @@ def advice(status: ServiceStatus) -> list[str]:
 def _storage_advice(storage: StorageStatus) -> list[str]:
     steps = []
     if storage.trouble:
-        cure = ("Copy the logs away (plug in the USB stick, or ridelog export) and delete what was copied; if it says "
-                "so again, the card is dying: replace it")
+        cure = ("Copy the logs away (plug in the USB stick, or ridelog export) and delete the copied ones; if this "
+                "happens again, the card is dying: replace it")
         if storage.trouble.startswith(READ_ONLY):
             # a service that was started on it sees it through a mount of its own, which stays read-only
             cure = ("Mount it writable (sudo mount -o remount,rw /); if this stays: sudo systemctl restart ridelog. "
-                    "When it comes again, copy the logs away (plug in the USB stick): the card is dying, replace it")
+                    "If it happens again, copy the logs away (plug in the USB stick): the card is dying, replace it")
         steps.append(f"Log: not written for {_span(storage.since_s)}: {storage.trouble}. {storage.rows_waiting} rows "
                      f"wait in memory and are lost if the power goes. {cure}.")
     if storage.rows_lost:
@@ -117,8 +117,8 @@ def _storage_advice(storage: StorageStatus) -> list[str]:
                      "more often, or set record_dump: false.")
     if storage.notices:
         steps += [f"Log folder: {words}." for words in storage.notices]
-        steps.append("Log folder: copy the logs away, look at what ends in .aside and delete it; if more comes, the "
-                     "card is dying: replace it.")
+        steps.append("Log folder: copy the logs away, look at the files that end in .aside and delete them; if more "
+                     "appear, the card is dying: replace it.")
     return steps
 
 
@@ -127,7 +127,8 @@ def _sensor_advice(name: str, sensor: SensorStatus) -> list[str]:
         return [f"{name}: {sensor.note} (at {sensor.place})."] if sensor.note else []
     if sensor.state == "doubtful":
         return [f"{name}: {sensor.last_error} (at {sensor.place})."]
-    error = f" It said: {sensor.last_error}." if sensor.last_error else ""
+    said = sensor.last_error.removeprefix(f"{sensor.place}: ") if sensor.last_error else ""
+    error = f" Last error: {said}{'' if said.endswith(('?', '.')) else '.'}" if said else ""
     kind = accelerometers().get(sensor.driver)
     check = serial_advice(sensor.state) if kind is None else kind.advice(sensor.state)
     board = f" {port_advice(sensor.place)}".rstrip()

@@ -127,8 +127,8 @@ def _all(known: list["Study"], asked: StudyQuestion) -> Answer:
     said = {"page": str(asked.out / "index.html"), "studies": [
         {**_in_short(one), "seconds": round(carried[one.called].seconds, 2),
          "failure": carried[one.called].failure or None} for one in chosen]}
-    return Checked(f"{len(chosen)} studies, {len(failed)} not as they state. Page: {asked.out / 'index.html'}", said,
-                   not failed)
+    return Checked(f"{len(chosen)} studies, {len(failed)} contradict their stated words. "
+                   f"Page: {asked.out / 'index.html'}", said, not failed)
 
 
 def show_progress(done: int, of: int) -> None:

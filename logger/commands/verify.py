@@ -53,7 +53,7 @@ def _lines(checks: list[FileCheck], ok: bool) -> Iterator[str]:
         yield f"{check.path} ({check.kind}{state}): {_counts_in_words(_totals([check]))}"
         yield from (f"    {words}" for words in (*check.problems, *check.notes))
     if not ok:
-        yield ("What to do: no command reads a torn or corrupt record; all others count."
+        yield ("Commands skip torn and corrupt records and read all others."
                + " Export to the stick again." * any(not check.ok and check.kind == "manifest" for check in checks))
 
 

@@ -62,7 +62,7 @@ def _left_out(counts: Counts) -> list[LeftOut]:
     return [damaged(counts.damaged_lines), *(LeftOut(number, "row", why) for number, why in (
         (counts.repeated, "that are known already"),
         (counts.contradictions, "that contradict a known one of the same number and time; the first one is kept"),
-        (counts.undated, "without a date"), (counts.unplaced, "without a place or a direction"),
+        (counts.undated, "without a date"), (counts.unplaced, "without a position or a direction"),
         (counts.trimmed, "cut at the ends of drives")))]
 
 
@@ -137,7 +137,7 @@ def _words_cars(figures: FleetFigures) -> list[str]:
               f"{int(figures.car_passes[one]):,} passes" for one in sure[:shown_cars]]
     if len(sure) > shown_cars:
         lines.append(f"  and {len(sure) - shown_cars} more (--json has all)")
-    return lines + ([f"  of {alone} cars nothing is known: they share no road with others"] if alone else [])
+    return lines + ([f"  {alone} cars share no road with others: their bias is not known"] if alone else [])
 
 
 def _roads(roads: RoadTable) -> list[str]:
@@ -156,7 +156,7 @@ def _changes(roads: RoadTable) -> list[str]:
     worse = np.flatnonzero(roads.worse)
     order = worse[np.argsort(roads.p_value[worse], kind="stable")][:_SHOWN_ROADS].tolist()
     limit = change_found(roads)
-    power = ([f"A change of {limit:.2f} m/km a year would be found on half of the {roads.by}s with a power of 80 %"]
+    power = ([f"On half of the {roads.by}s, a change of {limit:.2f} m/km a year would be found with a power of 80 %"]
             if isfinite(limit) else [])
     if not roads.changes_known:
         return [f"Whether a {roads.by} has become worse is not known"]

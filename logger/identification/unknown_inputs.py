@@ -172,7 +172,7 @@ def read_input(road: RoadInput, name: str) -> float:
     """The number of that name. ValueError, which lists the names there are, for another one."""
     whole = run_and_name(name)[1]
     if whole not in (known := input_names(road)):
-        raise ValueError(f"the road has no number {name!r}; expected one of {', '.join(known)}"
+        raise ValueError(f"the road has no parameter {name!r}; expected one of {', '.join(known)}"
                          + ("" if road.obstacles else "; give it a bump or a step first"))
     part, _, leaf = whole.rpartition(".")
     return float(getattr(road.obstacles[part] if part else road, leaf))

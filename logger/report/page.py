@@ -67,11 +67,11 @@ FLAG_MEANINGS: Mapping[str, str] = {
     "speed_doubtful": "the speed and the places of the GPS disagree: no IRI",
     "slow": "below the speed at which the r.m.s. relation holds",
     "fast": "above the speed at which the r.m.s. relation holds",
-    "stationary": "the car stood inside the window; that time is not in the averages",
+    "stationary": "the car stood inside the window; averages leave that time out",
     "time_unset": "the GPS had not given the time yet",
     "partial": "cut short by the end of a drive or of the recording",
-    "unsettled": "too near to a start, an end or a hole in the readings",
-    "hidden": "the ride is below the sensor's noise: no value; means count half of the power that was read",
+    "unsettled": "too near to a start, an end or a gap in the readings",
+    "hidden": "the ride is below the sensor's noise: no value; averages count half of the measured power",
     "faint": "the sensor hardly sees this road at this speed",
     "blind": "no speed: a window by time, without distance",
 }
@@ -217,7 +217,7 @@ def _notes_section(summary: DriveSummary, files: Sequence[LoggedFile]) -> doc.Ht
     if damaged:
         notes.append(_warning(f"{damaged} damaged {'line was' if damaged == 1 else 'lines were'} left out."))
     if summary.blind_s > 0:
-        notes.append(f"{span_words(summary.blind_s)} without any speed count in no distance, map or curve.")
+        notes.append(f"{span_words(summary.blind_s)} without any speed: left out of distance, map and curves.")
     notes += [f"iri_m_per_km: {meaning}"
               for meaning in _different(_inside(file.sidecar or {}, "iri_m_per_km") for file in files)]
     notes.append(f"{counted(summary.windows, 'window')} from {counted(len(files), 'log file')}")

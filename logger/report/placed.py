@@ -67,14 +67,14 @@ def of_passes(files: Sequence[LoggedFile], rows: Sequence[WindowRecord], figures
     every = sum(len(one.records) for one in files)
     known = sum(placed(one) and not _has_iri(one) for one in rows)
     return counting((*of_files(files), LeftOut(every - len(rows), "row", "of other days, or without a date"),
-                     LeftOut(len(rows) - figures_of, "row", "without a place"),
+                     LeftOut(len(rows) - figures_of, "row", "without a position"),
                      LeftOut(known, "row", "without a usable IRI")))
 
 
 def of_sections(files: Sequence[LoggedFile], used: Collection[WindowRecord], on_route: bool) -> tuple[LeftOut, ...]:
     """Of rows by their way, or by a route."""
     every = sum(len(one.records) for one in files)
-    why = "off the route, or without a place" if on_route else "without a way"
+    why = "off the route, or without a position" if on_route else "without a distance"
     return counting((*of_files(files), LeftOut(every - len(used), "row", why),
                      LeftOut(sum(not _has_iri(one) for one in used), "row", "without a usable IRI")))
 

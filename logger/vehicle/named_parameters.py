@@ -305,7 +305,7 @@ def free_parameter_named(effects: Sequence[Chosen], name: str) -> FreeParameter 
             for at, one in enumerate(effects[index].effect.parameters) if one.is_free}
     if leaf not in free:  # refinements are free where they are asked for
         known = ", ".join(f"{effect}.{one}" for one in free) or "none of it"
-        raise ValueError(f"{effect} has no number {leaf!r} that a fit can move; expected {known}")
+        raise ValueError(f"{effect} has no parameter {leaf!r} that a fit can change; expected {known}")
     return free[leaf]
 
 

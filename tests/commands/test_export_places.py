@@ -106,7 +106,7 @@ def test_two_cars_that_had_one_number_already_lose_nothing(
     assert main(["verify", str(stick)]) == 0
     checked = capsys.readouterr().out
     assert f"{old[0]} (log): 5 good" in checked
-    assert "until an export found another log in its place" in checked
+    assert "as another log had that name" in checked
     (folder / old[0]).write_bytes(b"worn out\n")
     assert main(["verify", str(stick)]) == 1
     assert f"{old[0]}: corrupt" in capsys.readouterr().out

@@ -113,7 +113,7 @@ def test_wrong_use(decay: Path, arguments: list[str], complaint: str) -> None:
 def test_records_that_will_not_do(tmp_path: Path) -> None:
     t_s = np.arange(200) / 100
     still = written(tmp_path / "still.csv", {"t_s": t_s, "a": np.sin(t_s), "b": np.ones(200)})
-    with pytest.raises(BadInput, match=r"still.csv:2: expected b to move, found 1 all along"):
+    with pytest.raises(BadInput, match=r"still.csv:2: expected b to move, found 1 throughout"):
         main(["modes", str(still)])
     t_s[100:] += 0.5
     with pytest.raises(BadInput, match=r"gap.csv:102: expected samples evenly 0.01 s apart"):

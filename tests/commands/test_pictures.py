@@ -83,7 +83,7 @@ def test_the_same_result_is_the_same_file(folder: Path, monkeypatch: pytest.Monk
     (["iri", "road.csv", "--out", "x.csv"], "--out x.csv: expected a file that ends in one of .html, .png, .svg"),
     (["iri", "road.csv", "--out", "nowhere/x.png"], "expected a file in a folder that exists"),
     (["modes", "decay.csv", "--method", "decrement", "--out", "x.png"],
-     "--out x.png: expected a result with pictures, found one without; .html holds its words"),
+     "--out x.png: this result has no pictures; .html holds its text"),
     (["estimate", "drive.csv", "--vehicle", "rav4-2009", "--out", "drive.csv.png", "--profile-out", "drive.csv.png"],
      "--profile-out drive.csv.png: expected a different file each time"),
 ])

@@ -47,10 +47,10 @@ def test_commands_on_logs_count_what_they_leave_out(
     assert left_out(capsys, "convert", logs, "--to", tmp_path / "a.csv") == {line: 1}
     assert left_out(capsys, "report", logs, "--out", tmp_path / "a.html") == {line: 1}
     assert left_out(capsys, "sections", logs) == {line: 1, "row without a usable IRI": 3}
-    assert left_out(capsys, "passes", logs) == {line: 1, "row without a usable IRI": 3, "row without a place": 3}
+    assert left_out(capsys, "passes", logs) == {line: 1, "row without a usable IRI": 3, "row without a position": 3}
     by_fleet = left_out(capsys, "fleet", "ingest", logs, "--to", tmp_path / "town", "--car", "a")
     assert by_fleet[line] == 1
-    assert by_fleet["row without a place or a direction"] >= 3
+    assert by_fleet["row without a position or a direction"] >= 3
     for words in (("sections", logs), ("passes", logs), ("report", logs, "--out", tmp_path / "a.html")):
         assert main(list(map(str, words))) == 0
         assert "Not used: 1 damaged line ('ridelog verify' lists them)" in capsys.readouterr().out
@@ -73,8 +73,8 @@ def test_of_a_drive_the_lab_counts_standing_beginnings_and_holes() -> None:
 
 
 def test_one_form() -> None:
-    several = [LeftOut(3, "row", "without a place"), LeftOut(0, "row", "torn"), LeftOut(1.2, "s", "at an end"),
-               LeftOut(4, "row", "without a place"), LeftOut(12.34, "s", "without a fix")]
-    assert left_out_lines(several) == ["Not used: 7 rows without a place; 12.3 s without a fix."]
-    assert left_out_json(several)["left_out"][0] == {"amount": 7, "unit": "row", "why": "without a place"}
+    several = [LeftOut(3, "row", "without a position"), LeftOut(0, "row", "torn"), LeftOut(1.2, "s", "at an end"),
+               LeftOut(4, "row", "without a position"), LeftOut(12.34, "s", "without a fix")]
+    assert left_out_lines(several) == ["Not used: 7 rows without a position; 12.3 s without a fix."]
+    assert left_out_json(several)["left_out"][0] == {"amount": 7, "unit": "row", "why": "without a position"}
     assert counting([]) == () and left_out_lines([]) == []

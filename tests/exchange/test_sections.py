@@ -86,7 +86,9 @@ def test_python_gives_arrays(logs: Path) -> None:
     assert found.length_m == pytest.approx(0.1 * MILE_M)
     assert found.iri_m_per_km.shape == found.condition.shape == (2,)
     assert found.end_m[-1] == pytest.approx(30 * WINDOW_M)
-    assert len(found.charts()) == 1
+    (chart,) = found.charts()
+    assert (chart.x_name, chart.y_name) == ("distance [mi]", "IRI [in/mi]")
+    assert chart.lines[0].y == pytest.approx(found.iri_m_per_km * 63.36)
 
 
 @pytest.mark.parametrize(("words", "complaint"), [

@@ -128,4 +128,4 @@ def test_a_port_that_is_not_on_the_pins_is_said_beside_its_silence(
     monkeypatch.setattr("logger.commands.status.port_advice", lambda port: f"{port} is the debug connector")
     gps = SensorStatus("nmea", "/dev/serial0", state, last_error="no such port")
     said = "\n".join(screen(replace(STATUS, gps=gps), None))
-    assert ("/dev/serial0 is the debug connector. It said: no such port." in said) == is_said
+    assert ("/dev/serial0 is the debug connector. Last error: no such port." in said) == is_said

@@ -270,7 +270,7 @@ def test_command_tells_a_person(tmp_path: Path, capsys: pytest.CaptureFixture[st
         f"{tmp_path}/00002-001.csv.part (log, open): 2 good, 1 torn, 0 corrupt, 1 gap",
         "    line 3: gap: expected segment 2, found 3",
         f"{tmp_path}/00001-001.csv (log): 2 good, 0 torn, 0 corrupt, 0 gaps",
-        "What to do: no command reads a torn or corrupt record; all others count.",
+        "Commands skip torn and corrupt records and read all others.",
     ]
 
 

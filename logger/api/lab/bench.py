@@ -389,7 +389,7 @@ def require_compiler(command: str, effects: Collection[Effect]) -> None:
     """
     if names := slow(effects):
         raise BadInput(f"{command} needs the lab extra (pip install '.[lab]'), which is not installed: without it "
-                       f"{len(names)} of {len(effects)} effects cannot be tried, and what it says would mislead")
+                       f"{len(names)} of {len(effects)} effects cannot be tried, and its answer would mislead")
 
 
 def _try_own(found: Bench, files: Sequence[str]) -> None:

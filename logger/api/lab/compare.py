@@ -458,7 +458,7 @@ def spectra(residuals: ModelResiduals) -> tuple[Curves, Curves]:
             Line(name, f_hz[inside], one[inside])
             for name, one in zip(("measured", "residual", "model"), levels_db, strict=True)))
 
-    return drawn("The body", 0.0, _BODY_HZ), drawn("Wheels and above", _BODY_HZ, f_hz[-1])
+    return drawn("Body", 0.0, _BODY_HZ), drawn("Wheels and above", _BODY_HZ, f_hz[-1])
 
 
 def _places(standing: Standing) -> doc.Html:
@@ -499,9 +499,9 @@ def _alignment(found: LabComparison) -> doc.Html:
     if not lines or are_on_rig(runs):
         return doc.EMPTY
     drawn = chart(Curves("Lead of the model over the measurement", "distance into the run [m]", "lead [ms]",
-                           tuple(lines), (0.0, "together")))
+                           tuple(lines), (0.0, "no lead")))
     return doc.section("Alignment", drawn + doc.hint(
-        "Constant: a clock or a position is off. Growing with distance: the speed is wrong. Before the refit."))
+        "A constant lead: a clock or a position is off. A growing lead: the speed is wrong. Shown before the refit."))
 
 
 # --- tables ---
@@ -512,7 +512,7 @@ def _comparison_page_tables(found: LabComparison) -> doc.Html:
     unit = found.plain.residuals.unit
     return (_table("By band", "Hz", plain.frequency, refitted.frequency)
             + (_table("By speed", "m/s", plain.speed, refitted.speed) if refitted.speed else doc.EMPTY)
-            + _table("By amplitude", unit, plain.amplitude, refitted.amplitude))
+            + _table("By amplitude of the motion", unit, plain.amplitude, refitted.amplitude))
 
 
 def _table(title: str, unit: str, plain: Sequence[Part], refitted: Sequence[Part]) -> doc.Html:
@@ -533,7 +533,7 @@ def _tests(found: LabComparison) -> doc.Html:
     rows = [(test.name, _measured(test.value, test.unit), _measured(test.standard_error),
              chance(test.p_value) if np.isfinite(test.p_value) else "cannot tell",
              "found" if test in found.tests_found else "") for test in found.tests.tests]
-    return doc.section("All tests of the residual", doc.grid(("Test", "Value", "Standard error", "p-value", ""), rows,
+    return doc.section("All residual tests", doc.grid(("Test", "Value", "Standard error", "p-value", ""), rows,
                                                                 words=(0, 4))
                        + doc.hint("Found: improbable in noise, and large enough to matter."))
 
@@ -541,7 +541,7 @@ def _tests(found: LabComparison) -> doc.Html:
 def _numbers(found: LabComparison) -> doc.Html:
     rows = [(name, f"{move:+.1%}", "beyond its tolerance" if name in found.far else "")
             for name, move in found.moves.items()]
-    return doc.section("What the refit moved", doc.grid(("Parameter", "By", ""), rows, words=(0, 2)))
+    return doc.section("Parameters moved by the refit", doc.grid(("Parameter", "Shift", ""), rows, words=(0, 2)))
 
 
 def _titled(title: str, curve: Curve) -> str:

@@ -663,7 +663,7 @@ def car_sections(found: LabDiagnosis) -> doc.Html:
     said = doc.hint("Over the range that the model's suspensions reach in 99.9 % of these runs, without forces that "
                     "have a memory.") if curves else doc.EMPTY
     return (doc.section("The car's parameters", numbers if rows else doc.EMPTY)
-            + doc.section("Its springs and dampers", curves + said))
+            + doc.section("Springs and dampers", curves + said))
 
 
 def _force(one: ForceCurve) -> doc.Html:

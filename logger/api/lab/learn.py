@@ -360,5 +360,5 @@ def _tiles(summary: dict[str, object]) -> Html:
         return f"{value:.3f}" if isinstance(value, float) else "not known"
 
     return tiles([("NRMSE, file unchanged", error("error_before"), ""),
-                  ("NRMSE in the end", error("error_after_unseen"), JUDGED_ON),
+                  ("Final NRMSE", error("error_after_unseen"), JUDGED_ON),
                   ("Noise floor", error("noise_floor_error"), "NRMSE")])

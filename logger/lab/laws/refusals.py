@@ -69,7 +69,7 @@ def refusal(draft: Draft, model: Baseline) -> Refusal | None:
     errors = standard_errors(model.linear)
     one = next(each for each in errors.effects if each.effect.name == draft.name)
     if does_nothing(one, errors.numbers):
-        return Refusal(draft.title, f"its strength is within {SURE_SIGMA:g} standard errors of doing nothing")
+        return Refusal(draft.title, f"its strength is within {SURE_SIGMA:g} standard errors of no effect")
     if why := _beyond(model.posterior, one):
         return Refusal(draft.title, why)
     if draft.family.is_straight(draft, one, SURE_SIGMA):

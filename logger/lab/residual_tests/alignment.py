@@ -52,7 +52,7 @@ class ShiftTest(ResidualTest):
         time_s, length_m, is_time = (found.figures[name] for name in ("time_s", "length_m", "is_time"))
         as_time, as_length = f"{abs(time_s) * 1000:.0f} ms", f"{abs(length_m):.2f} m"
         if not np.isfinite(length_m):  # a rig has no speed
-            words = f"{as_time} all along"
+            words = f"{as_time} throughout"
         elif is_time is None:
             words = f"about {as_time} or {as_length}; drives at other speeds would show which"
         else:

@@ -557,7 +557,7 @@ class Search(Generic[M, P, F]):
             shared_parameters(one, here.values) or (added_to is None and one.name in self._promising))]
         if not may_be and added_to is not None:
             return now
-        self.progress(f"is {name} still what it was?" if added_to is None else
+        self.progress(f"fitting {name} again" if added_to is None else
                       f"is it {name}, or {' or '.join(one.name for one in may_be)}?")
         without = added_to or self.without(now, name)
         gain = without.score - now.score

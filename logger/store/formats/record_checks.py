@@ -340,7 +340,7 @@ def read_channels(path: Path | str, only: Sequence[str] = ()) -> ChannelRecord:
                         for name, column in zip(wanted[1:], table.T[1:], strict=True)], axis=1)
     for column, name in enumerate(wanted[1:]):
         if not samples[:, column].std() > 1e-12 * np.abs(samples[:, column]).max():
-            raise BadInput(f"{place(file, 0)}: expected {name} to move, found {samples[0, column]:g} all along; "
+            raise BadInput(f"{place(file, 0)}: expected {name} to move, found {samples[0, column]:g} throughout; "
                            "leave its column out")
     if repeats := repeated_samples.find_repeats(samples):
         raise BadInput(f"{file}: {repeats.complaint}: write a record only as often as the sensor is read")

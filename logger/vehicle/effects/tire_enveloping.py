@@ -12,7 +12,7 @@ from logger.vehicle.vehicle import Vehicle
 
 
 class TireEnveloping(VehicleEffect):
-    title = "another contact length than the model's"
+    title = "a contact length other than the model's"
     parameters = (
         Parameter("contact_patch_m", 0.25, 0.0, 1.0, None, Scale.LINEAR, (0.03, 0.08, 0.14, 0.2, 0.28, 0.36, 0.5),
                   "over which a tire averages the road"),
