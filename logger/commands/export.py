@@ -49,7 +49,7 @@ class ExportQuestion(Question):
     def __post_init__(self) -> None:
         super().__post_init__()
         if (self.to is not None) + (self.unmounted is not None) + self.removed != 1:
-            raise self.complaint("export: expected `to` DIR")
+            raise self.complaint(f"export: expected `to` DIR{' alone' * (self.to is not None)}")
 
 
 VERB = Verb(ExportQuestion, "logger.commands.export:exported")

@@ -56,12 +56,12 @@ HEAD = """\
 Made by `python -m tests.benchmarks.faults`; the counts are those of the run that made it.
 [What goes wrong in a car](../faults.md) says what ridelog promises.
 
-- Power is cut in a model of the disk: what each write, fsync and rename leaves behind when all ends there.
+- Power is cut in a model of the disk: what each write, fsync and rename leaves behind at that instant.
   Only so can a cut be tried at every single change.
 - Sensors are bytes on simulated buses and ports, in simulated time.
 - Kills, and a service that may write no more, are those of the real process.
 - Sticks are folders behind a model of the system's calls, which forgets what FAT would.
-- Limits of time are of the processor's, so that a busy machine breaks none.
+- Time limits are in processor time, so that a busy machine breaks none.
 """
 
 

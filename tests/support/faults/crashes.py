@@ -367,8 +367,8 @@ def power_cut_around_an_outage(folder: Path, seed: int) -> Found:
     return _cut_everywhere(folder, seed, power=True, kind=TroubledLife)
 
 
-_REPAIRED = ("; the next start leaves only finished files that `ridelog verify` has nothing against, and no session "
-             "number is given twice")
+_REPAIRED = ("; the next start leaves only finished files that pass `ridelog verify`, and no session number is "
+             "used twice")
 _COUNTED = ("{rows_promised.total:.0f} rows promised, {rows_lost.total:.0f} lost; {torn_or_damaged.total:.0f} damaged "
             "lines seen, {damaged_accepted.total:.0f} accepted")
 HAZARDS = (
@@ -377,10 +377,10 @@ HAZARDS = (
            "no row that was written is lost" + _REPAIRED, _COUNTED, killed_at_every_change, range(12), 1),
     Hazard("power cut", "the same; what was not synced is dropped, torn at sectors of 512 bytes, reordered, zeros, "
            "garbage or other digits, and new names come early, late or never",
-           "no row that was synced is lost, none that is damaged is taken for good" + _REPAIRED, _COUNTED,
+           "no row that was synced is lost, no damaged row is accepted" + _REPAIRED, _COUNTED,
            power_cut_at_every_change, range(12), 1),
     Hazard("power cut before, in and after a disk's outage", "the same, and for a while the disk refuses changes of a "
            "kind, or all (EIO), with half of each refused write done",
-           "no row that was synced is lost, none that is damaged is taken for good" + _REPAIRED, _COUNTED,
+           "no row that was synced is lost, no damaged row is accepted" + _REPAIRED, _COUNTED,
            power_cut_around_an_outage, range(24), 2),
 )

@@ -556,7 +556,7 @@ def lying_stick_is_not_paired(folder: Path, case: None) -> Found:
 
 
 _AGAIN = ("at every instant: nothing on the card changes, nothing of others is touched, only what is whole on the "
-          "stick counts as exported; the next try puts it right")
+          "stick counts as exported; the next try completes it")
 _LINKS = (hostile_link, hostile_link_to_nothing, hostile_link_to_folder, hostile_pipe, hostile_folder,
           hostile_hard_link)
 HAZARDS = (
@@ -569,7 +569,7 @@ HAZARDS = (
     Hazard("stick without room", "for none, one, two or three of four files",
            "the oldest are copied whole, the others are named with the bytes that lack; the next try does the rest",
            "as promised", little_room, (0, 1, 2, 3)),
-    Hazard("short writes", "a write takes 1 to 100 bytes", "gone on with", "as promised", few_bytes_at_a_time,
+    Hazard("short writes", "a write takes 1 to 100 bytes", "the rest is written", "as promised", few_bytes_at_a_time,
            (1, 7, 100)),
     Hazard("stick that does not keep what it was given", "a bit of each write changes",
            "found by reading back; nothing counts as exported", "as promised", stick_that_lies),
