@@ -64,7 +64,7 @@ _WEIGHTINGS = ", ".join(names("logger.dsp.weightings", "WEIGHTING"))
 
 @dataclass(frozen=True)
 class ComfortQuestion(Question):
-    """How a recorded ride feels and what it does to health: ISO 2631-1 values of an acceleration record.
+    """Rate how a recorded ride feels and what it does to health: ISO 2631-1 values of an acceleration record.
 
       ridelog comfort seat.csv
       ridelog comfort seat.csv --daily-hours 4 --out ride.html
@@ -99,7 +99,7 @@ class ComfortQuestion(Question):
 
 @dataclass(frozen=True)
 class EstimateQuestion(LongQuestion):
-    """The road's roughness from a drive's acceleration: IRI of windows with standard errors, and the road's profile.
+    """Estimate the road from a drive's acceleration: IRI of windows with standard errors, and the road's profile.
 
     RUN is a folder with a drive.csv (t_s,accel_z_mps2,speed_mps,distance_m), or such a file. Where a profile.csv lies
     in the folder, estimate compares with its exact IRI. Beside the estimates it prints the limit: the accuracy of an
@@ -164,7 +164,7 @@ class EstimateQuestion(LongQuestion):
 
 @dataclass(frozen=True)
 class CalibrateQuestion(LongQuestion):
-    """How much a vehicle shakes on roads of known roughness: IRI and Gd(n0) per r.m.s. acceleration, comfort per IRI.
+    """Compute how much a vehicle shakes on known roads: IRI and Gd(n0) per r.m.s. acceleration, comfort per IRI.
 
     The vehicle's model drives over random roads of IRI 1 to 10 m/km at 10 to 70 mph; one line per speed comes out, with
     the scatter of single roads. The result is cached beside the vehicle's file (NAME.calibration.json) or in the user's
@@ -204,7 +204,7 @@ def _check_method(method: str) -> None:
 
 @dataclass(frozen=True)
 class ModesQuestion(Question):
-    """Natural frequencies, damping ratios and mode shapes of a vibration record, each with its standard deviation.
+    """Find natural frequencies, damping ratios and mode shapes of a vibration record, each with its standard deviation.
 
     FILE is CSV with t_s and one column per sensor, evenly sampled: a free decay (push, let go, record) or the response
     to random forces; --input names a column with the force or motion that drives it. You need not pick poles: modes
@@ -292,7 +292,7 @@ _OBSTACLES = ("add one to the road [m]; may repeat. bump (Eq 4.41 of Blum 2015):
 
 @dataclass(frozen=True)
 class SimulateQuestion(Question):
-    """What a vehicle's accelerometer would record on a road: a drive, simulated.
+    """Simulate a drive: what a vehicle's accelerometer would record on a road.
 
       ridelog simulate --vehicle rav4-2009 --profile road.csv --speed 20 --out drive.csv
       ridelog simulate --vehicle rav4-2009 --profile road.csv --speed 20 --effect wheel_lift \\
@@ -418,7 +418,7 @@ class ProfileQuestion(Question):
 
 @dataclass(frozen=True)
 class IriQuestion(ProfileQuestion):
-    """Exact IRI of a measured profile (ASTM E1926; Sayers, TRR 1501, 1995), whole and window by window.
+    """Compute the exact IRI of a measured profile (ASTM E1926; Sayers, TRR 1501, 1995), whole and window by window.
 
       ridelog iri road.csv --window 0.1mi
       ridelog iri road.csv --localized 2.5 --out iri.html
@@ -448,7 +448,7 @@ class IriQuestion(ProfileQuestion):
 
 @dataclass(frozen=True)
 class ClassifyQuestion(ProfileQuestion):
-    """Class, degree of roughness and waviness of a profile of at least 100 m (ISO 8608).
+    """Classify a profile of at least 100 m by ISO 8608: class, degree of roughness and waviness.
 
       ridelog road classify road.csv
       ridelog road classify road.csv --out road.html
@@ -465,8 +465,8 @@ class ClassifyQuestion(ProfileQuestion):
 
 @dataclass(frozen=True, kw_only=True)
 class RandomRoadQuestion(Question):
-    """Make a random road with the spectrum of ISO 8608: Gd(n) = Gd(n0) (n / n0)^-w (Eq 4.1, 4.2 of Blum 2015). Same
-    numbers, same road.
+    """Make a random road with the spectrum of ISO 8608: Gd(n) = Gd(n0) (n / n0)^-w (Eq 4.1, 4.2 of Blum 2015).
+    The same options give the same road.
 
       ridelog road generate --class B --length 1000 --out road.csv
       ridelog road generate --iri 2.5 --seed 7 --out smooth.csv

@@ -72,7 +72,7 @@ class LogsQuestion(Question):
 
 @dataclass(frozen=True)
 class SectionsQuestion(LogsQuestion):
-    """Logs in sections of one length, as road agencies file them: mean IRI with its standard error, condition, comfort.
+    """Give logs in sections, as road agencies file them: mean IRI with its standard error, condition, comfort.
 
       ridelog sections /media/RIDELOG --length 0.1mi
       ridelog sections drive-logs/ --length 100m --out sections.geojson
@@ -106,8 +106,8 @@ class SectionsQuestion(LogsQuestion):
 
 @dataclass(frozen=True)
 class PassesQuestion(LogsQuestion):
-    """Repeated drives combined by place and direction: the mean of all passes with its standard error, what changed,
-    and places that somebody should go and see.
+    """Combine repeated drives by place and direction: the mean of all passes with its standard error, what changed,
+    and a work list of places to look at.
 
       ridelog passes /media/RIDELOG --out means.html --visit places.gpx
       ridelog passes spring/ autumn/ --split 2026-07-01 --out changes.geojson
@@ -142,8 +142,8 @@ class PassesQuestion(LogsQuestion):
 
 @dataclass(frozen=True)
 class ConvertQuestion(LogsQuestion):
-    """Write logs as a file for other programs, by its ending: maps such as .geojson, tracks such as .gpx, tables such
-    as .csv.
+    """Write logs for other programs, in the format of the file's extension: maps such as .geojson, tracks such as .gpx,
+    tables such as .csv.
 
     Each row of a log becomes a line on the map, from half-way to the row before to half-way to the next; a row without
     neighbours is a point, and one without a position has no place on it. Values keep their names and units; what is not
@@ -239,8 +239,8 @@ Dataset = Annotated[Path | str, Argument("folder that 'fleet ingest' has made", 
 
 @dataclass(frozen=True)
 class SummariseQuestion(FleetQuestion):
-    """Mean IRI with its standard error, change and comfort by road; which car reads how much too high, from the roads
-    that cars share.
+    """Summarise roads and cars: mean IRI with its standard error, change and comfort by road; how much too high a car
+    reads, from the roads that cars share.
 
       ridelog fleet summarise county --by section --out sections.csv
       ridelog fleet summarise county --since 2026-01-01 --public 3
@@ -282,7 +282,7 @@ INGEST = Verb(IngestQuestion, "logger.api.fleet:ingested")
 SUMMARISE = Verb(SummariseQuestion, "logger.api.fleet:summarised", (Out(
     f"write all rows as {' '.join(FORMATS)}", metavar="FILE", others=FORMATS, many=False, is_drawn=False),))
 REPORT = Verb(ReportQuestion, "logger.api.fleet:reported")
-FLEET = Verbs('''Many cars over years: logs into a dataset, the figures of its roads and cars, and a map of them.
+FLEET = Verbs('''Combine many cars over years: logs into a dataset, figures of its roads and cars, and a map of them.
 
   ridelog fleet ingest /media/RIDELOG --to county --car "van 7"
   ridelog fleet summarise county --by section --since 2026-01-01 --out sections.parquet

@@ -95,7 +95,9 @@ def extracted(asked: ExtractQuestion) -> Checked:
     sources = asked.csv or asked.dumps
     extract_one = _extractor(asked)
     done: list[tuple[Path, Extracted]] = []
-    for source in sources:
+    for number, source in enumerate(sources, start=1):
+        if len(sources) > 1:
+            asked.progress(f"recording {number} of {len(sources)}: {source}")
         try:
             done.append((source, extract_one(source)))
         except (BadInput, DriverError) as error:

@@ -1,4 +1,4 @@
-"""Random roads of ISO 8608, and the class of a measured one.
+"""Make random roads of ISO 8608, or classify a measured one.
 
   ridelog road generate --class B --length 1000 --out road.csv
   ridelog road classify road.csv

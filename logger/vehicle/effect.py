@@ -148,9 +148,9 @@ AXLE = Parameter("axle", 0.0, 0.0, 2.0, None, Scale.LINEAR, (0.0,), "where it ac
 """Of an effect of suspensions, which may sit in those of one axle alone. A search tries both, and then each."""
 
 STATIC_RATIO = Parameter("static_to_sliding_ratio", 1.5, 1.0, 10.0, None, Scale.LINEAR, (1.5,),
-                         "friction at rest over that in motion", default=1.0)
+                         "friction at rest over friction in motion", default=1.0)
 STRIBECK_VELOCITY = Parameter("stribeck_velocity_m_per_s", 0.05, 1e-5, 10.0, None, Scale.LOG, (0.05,),
-                              "rate at which 1 / e of what is more at rest is left", default=0.05)
+                              "rate at which the excess of friction at rest has fallen to 1 / e", default=0.05)
 """Of a friction that holds more than it rubs."""
 
 

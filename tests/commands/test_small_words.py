@@ -49,7 +49,8 @@ def test_wrong_use_is_said_as_everything_else(
 @pytest.mark.parametrize(("arguments", "said"), [
     (["modes", "p.csv", "--from", "3ft"], "--from 3ft: expected a number, without its unit"),
     (["comfort", "p.csv", "--unit", "ft"], "--unit ft: expected one of mps2, g"),
-    (["export"], "export: expected --to DIR"), (["export", "--to", "a", "--removed"], "export: expected --to DIR"),
+    (["export"], "export: expected --to DIR"), (["export", "--to", "a", "--removed"],
+                                                        "export: expected --to DIR alone"),
 ])
 def test_what_an_option_may_not_be_is_one_sentence(arguments: list[str], said: str) -> None:
     with pytest.raises(BadInput, match=f"^{said}$"):

@@ -13,7 +13,7 @@ from logger.vehicle.vehicle import Vehicle
 
 
 class CgShift(VehicleEffect):
-    title = "the centre of gravity is ahead of the model's, or behind it"
+    title = "the centre of gravity lies ahead of the model's, or behind it"
     parameters = (
         Parameter("shift_m", 0.15, -1.0, 1.0, 0.0, Scale.LINEAR, (-0.15, -0.03, 0.03, 0.15),
                   "ahead positive, behind negative", step=1e-3),

@@ -12,7 +12,7 @@ from logger.vehicle.vehicle import Vehicle
 
 
 class ConstantForce(ForceEffect):
-    title = "a constant force, such as a weight or the zero of the force's sensor"
+    title = "a constant force, such as a weight or the zero offset of the load cell"
     parameters = (
         Parameter("push_n", 20.0, -1e4, 1e4, 0.0, Scale.LINEAR, (-20.0, 20.0), "up positive"),
     )

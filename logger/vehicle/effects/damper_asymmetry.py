@@ -18,11 +18,11 @@ class DamperAsymmetry(ForceEffect):
     title = "rebound damping differs from bump damping"
     parameters = (
         Parameter("rebound_to_bump_ratio", 1.5, 0.1, 10.0, 1.0, Scale.LOG, (0.67, 1.5, 3.0),
-                  "slope of the damper in extension over that in compression; the mean of the two stays"),
+                  "slope of the damper in extension over that in compression; their mean stays the same"),
         AXLE,
     )
     source = "J. C. Dixon, The Shock Absorber Handbook (2007), chapter 1: ratios of 2 to 3 are usual"
-    signature = "the body sits lower while it shakes; upward and downward peaks differ; twice each frequency appears"
+    signature = "the body sits lower while it shakes; upward and downward peaks differ; second harmonics appear"
     shown_by = "drive single bumps and a rough road, so that the suspension moves fast both ways"
 
     def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:

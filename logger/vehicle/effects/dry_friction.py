@@ -18,7 +18,7 @@ class DryFriction(ForceEffect):
         Parameter("friction_force_n", 60.0, 0.0, 2000.0, 0.0, Scale.LINEAR, (20.0, 60.0, 180.0),
                   "of each suspension, front and rear alike"),
         Parameter("transition_velocity_m_per_s", 0.02, 0.0, 0.2, None, Scale.LINEAR, (0.0, 0.003, 0.02),
-                  "rate at which the friction has grown to tanh(1) of its force; 0: at once", default=0.0,
+                  "rate at which the friction reaches 76 % of its force, tanh(1); 0: at once", default=0.0,
                   step=0.0003),
         STATIC_RATIO, STRIBECK_VELOCITY,
         AXLE,

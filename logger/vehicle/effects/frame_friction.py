@@ -26,7 +26,7 @@ class FrameFriction(ForceEffect):
         Parameter("body_friction_force_n", 10.0, 0.0, 2000.0, None, Scale.LINEAR, (0.0, 10.0),
                   "of the body against its guide, at each suspension", default=0.0),
         Parameter("transition_velocity_m_per_s", 0.02, 0.0, 0.2, None, Scale.LINEAR, (0.0, 0.003, 0.02),
-                  "speed at which the friction has grown to tanh(1) of its force; 0: at once", default=0.0,
+                  "speed at which the friction reaches 76 % of its force, tanh(1); 0: at once", default=0.0,
                   step=0.0003),
         STATIC_RATIO, STRIBECK_VELOCITY,
     )

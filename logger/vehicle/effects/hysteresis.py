@@ -37,7 +37,7 @@ def rates(p: Any, seen: Seen) -> tuple[Any]:
 
 
 class Hysteresis(ForceEffect):
-    title = "friction in each suspension that gives before it slides (Bouc-Wen)"
+    title = "friction in each suspension that yields before it slides (Bouc-Wen)"
     parameters = (
         Parameter("yield_force_n", 100.0, 0.0, 5000.0, 0.0, Scale.LINEAR, (30.0, 150.0),
                   "at which each suspension slides"),

@@ -20,7 +20,7 @@ most; such recorders take 100 samples a second or more. A longer delay is physic
 
 
 class TimeOffset(SensorEffect):
-    title = "the acceleration is late against the position"
+    title = "the acceleration lags the position"
     parameters = (
         Parameter("delay_s", 0.02, -2.0, 2.0, 0.0, Scale.LINEAR, (-0.02, 0.02), "late positive, early negative",
                   step=1e-6),
@@ -50,7 +50,7 @@ class TimeOffset(SensorEffect):
 
 
 class _OfOneRecorder(TimeOffset):
-    title = "what was measured is late against what drives it"
+    title = "the measurement lags the excitation"
     parameters = (replace(TimeOffset.parameters[0], start=0.002, low=-_ONE_RECORDER_S, high=_ONE_RECORDER_S,
                           trials=(-0.002, 0.002)),)
 

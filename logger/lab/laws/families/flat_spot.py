@@ -72,7 +72,7 @@ def _draft(context: LawContext, axle: str, runs: Sequence[str], radius_m: float,
                         for number, name in enumerate(names)) if last else f"p.{names[0]}"
     parameters = (
         Parameter("force_n", usual_n, -100 * usual_n, 100 * usual_n, 0.0, Scale.LINEAR, (usual_n,),
-                  "fall of the tire's force at the middle of the spot", step=0.1 * usual_n),
+                  "drop of the tire's force at the middle of the spot", step=0.1 * usual_n),
         Parameter("length_m", _LENGTH_M, 0.03, 0.8, None, Scale.LOG, (_LENGTH_M,), "of the spot, along the tread"),
         Parameter("turn_radius_m", radius_m, *_RADII_M, None, Scale.LOG, (radius_m,),
                   "of a wheel that turns once per blow", step=1e-5),

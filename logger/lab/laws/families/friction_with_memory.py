@@ -33,7 +33,7 @@ class FrictionWithMemory(Family):
                       "over which the force would grow to that at its initial stiffness"),
             Parameter("sharpness_ratio", 1.0, 1.0, 1.0, None, Scale.LINEAR, (1.0,),
                       "exponent: the higher, the sharper the yield", default=1.0))
-        return [self.draft(parameters, handed_on(states=1), _FUNCTIONS, title="friction that gives before it slides",
+        return [self.draft(parameters, handed_on(states=1), _FUNCTIONS, title="friction that yields before it slides",
                            at="loop")]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
