@@ -349,11 +349,12 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
                      "therefore treated its parameters as unknown, except those with a stated tolerance.")
     for one, group in zip(found.missing, groups(found), strict=True):
         lines += [_missing(found, one), *([_confusion(group, found)] if len(group) > 1 else [])]
-    if not found.missing and not found.unexplained:
+    if not found.missing and not found.exceeds_noise:
         more = " else" * bool(found.removed.drifting_sensors or found.removed.distance_error_m > 0)
         what, how = ("No effect", "") if found.beyond else (f"Nothing{more}", " within their tolerance")
+        is_so = "needed" if found.in_conflict else "missing"
         most = "calibration errors of the sensors" if found.within_calibration else "the sensor's noise"
-        lines.append(f"{what} is missing: with the model's parameters refitted{how}, the residual is hardly more than "
+        lines.append(f"{what} is {is_so}: with the model's parameters refitted{how}, the residual is hardly more than "
                      f"{most}.")
     if found.coloured and not found.exceeds_noise:
         lines.append("The sensor's noise is coloured (louder at some frequencies). It is equally loud at small and at "
@@ -424,7 +425,8 @@ def _car(found: LabDiagnosis) -> list[str]:
     if found.beyond:
         off = ", ".join(f"{name} by {share:+.0%} ({1 + share:.3g} times the file's)"
                         for name, share in found.beyond.items())
-        either = "" if found.missing and not found.exceeds_noise else ", or an unknown effect is missing"
+        either = (", or an unknown effect is missing" if found.exceeds_noise else
+                  "" if found.missing else ", or an effect is missing that acts as such a change does")
         lines.append(f"Parameters beyond their tolerance: {off}. Measure them: {'either ' * bool(either)}the vehicle's "
                      f"file is wrong there{either}.")
     if found.left_open:

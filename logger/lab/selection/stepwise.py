@@ -338,6 +338,8 @@ class Search(Generic[M, P, F]):
             now = self._reconsider(grown or self.likelihood.with_effect(best), best.effect.name, now)
             *earlier, added = names_of(now)[self.present:]
             last = UNTRIED
+            if not earlier and (refitted := self.without(now, added)).score < before.score - INDISTINGUISHABLE:
+                return self.run(refitted)  # the effect led the fit of the car's own numbers out of a wrong minimum
             steps.append((added, now.hold_out))
             for name in earlier:
                 now = self._reconsider(now, name)

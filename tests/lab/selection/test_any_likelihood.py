@@ -25,10 +25,12 @@ class Made:
 
     effects: tuple[Chosen, ...] = ()
     explains: float = 480.0
+    stuck: bool = False
+    """Whether its own numbers were fitted to a wrong minimum."""
 
     @property
     def score(self) -> float:
-        return -sum(WORTH[one.effect.name] + 100.0 * (not one.is_plain) for one in self.effects)
+        return 500.0 * self.stuck - sum(WORTH[one.effect.name] + 100.0 * (not one.is_plain) for one in self.effects)
 
     @property
     def explanation(self) -> float:
@@ -65,7 +67,7 @@ class MadeUp:
 
     def screened(self, base: Made, effects: Sequence[Effect], seen: Misalignment, near: Chosen | None,
                  pool: ThreadPoolExecutor, progress: Progress) -> list[Tried]:
-        tried = [Tried(replace(base, effects=(*base.effects, chosen(one, one.usual))), WORTH[one.name])
+        tried = [Tried(replace(base, effects=(*base.effects, chosen(one, one.usual)), stuck=False), WORTH[one.name])
                  for one in effects]
         return sorted(tried, key=lambda one: -one.gain)
 
@@ -118,6 +120,12 @@ def test_all_that_is_evident_is_found_the_most_telling_first() -> None:
     assert found.gains == {name: WORTH[name] for name in ("sensor_gain", "tire_damping", "sensor_offset")}
     assert [name for name, _ in found.steps] == ["sensor_gain", "tire_damping", "sensor_offset"]
     assert [one.effect.name for one in (*found.last.fits, *found.last.unfitted)] == ["time_offset"]
+
+
+def test_a_gain_that_is_the_fit_of_the_cars_own_numbers_is_no_effects() -> None:
+    found, plain = search().run(Made(stuck=True)), search().run(Made())
+    assert found.before == Made() and found.now == plain.now
+    assert (found.gains, found.rivals, found.steps) == (plain.gains, plain.rivals, plain.steps)
 
 
 def test_no_more_are_found_than_were_sought_until_it_goes_on() -> None:
