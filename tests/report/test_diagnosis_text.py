@@ -125,8 +125,8 @@ def test_numbers_outside_their_tolerance_are_named_with_how_far_they_are_off() -
                     in_conflict=True)
     nothing, conflict, _ = diagnosis_summary(found)
     assert found.unexplained and not found.exceeds_noise
-    assert nothing == ("No effect is needed: with the model's parameters refitted, the residual is hardly more than the "
-                       "sensor's noise.")
+    assert nothing == ("No effect is needed: with the model's parameters refitted, the residual is hardly more than "
+                       "the sensor's noise.")
     assert conflict.startswith("Parameters beyond their tolerance: "
                                "front.suspension_stiffness_n_per_m by +24% (1.24 times the file's), sprung_mass_kg by "
                                "-13% (0.87 times the file's). Measure them: either")
