@@ -598,7 +598,7 @@ def _charts(problem: UnknownCar, car: LearnedCar) -> Iterator[Chart]:
             road, noise = problem.expected_power(x, roads)
             lines.append(Line(name, f_hz[seen], (road + noise)[group].mean(axis=0)[seen]))
         yield Curves(f"Spectra at {3.6 * low:.0f} to {3.6 * high:.0f} km/h", "frequency [Hz]",
-                     "acceleration [m2/s4 per Hz]", tuple(lines), log_x=True, log_y=True)
+                     "power spectral density [(m/s2)2/Hz]", tuple(lines), log_x=True, log_y=True)
 
 
 learn_car = function("learn_car", LearnCarQuestion, learned)

@@ -85,7 +85,7 @@ def page(files: Sequence[LoggedFile], base: Sequence[MapLine] = (), base_name: s
     base          roads that are drawn beneath, out of a file named ``base_name``
     tiles_from    address of street pictures, with {z}, {x} and {y} in it; empty: none, and no request is made
     first         sections above the map
-    title         and a line under it; None: of drives, and their dates
+    title         and a line under it, of means that carry no flags; None: of drives, and their dates
     marked        rows with a number on the map and in the curves, which ``first`` lists; None: the roughest places,
                   which are listed too
     """
@@ -101,7 +101,7 @@ def page(files: Sequence[LoggedFile], base: Sequence[MapLine] = (), base_name: s
         _shares_section(summary),
         _places_section(records, summary.roughest) if marked is None else doc.EMPTY,
         _drives_section(drives) if len(drives) > 1 else doc.EMPTY,
-        _notes_section(summary, files),
+        _notes_section(summary, files) if title is None else doc.EMPTY,
         _settings_section(files),
         windows_table(records),
         doc.data_block("data", track_data(drives, base, places_passed(drives)) | {

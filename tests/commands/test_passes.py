@@ -128,6 +128,7 @@ def test_a_place_has_one_number_and_what_got_worse_is_called_so(
     assert main(["passes", str(logs), "--length", "10m", "--split", "2025-06-30", "--above", "4",
                  "--out", str(page), "--out", str(table)]) == 0
     text, shown = capsys.readouterr().out, page.read_text("utf-8")
+    assert "1 log file" not in shown  # they are means
     first, second = text.splitlines()[:2]
     said = re.fullmatch(r"Between the two periods the IRI of 100 pieces of 10 m changed by \+(0\.\d+) ± (0\.\d+) "
                         "m/km on average", first)
