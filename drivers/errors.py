@@ -127,6 +127,6 @@ def why_forbidden(number: int, path: str | os.PathLike[str], access: str, group:
     """
     if number == errno.EACCES:
         return f"not allowed; let the user join the group {group} (sudo usermod -aG {group} USER) and log in again"
-    return ("forbidden by the device policy of the service (or of a container), not by its groups: restart it (sudo "
-            "systemctl restart ridelog); if it says so again, sudo systemctl edit ridelog, write [Service] and "
+    return ("forbidden by the device policy of the service (or of a container), not by its groups. Restart it (sudo "
+            "systemctl restart ridelog). If it says so again: sudo systemctl edit ridelog, write [Service] and "
             f"DeviceAllow={os.path.realpath(path)} {access} on two lines, and restart it")

@@ -336,7 +336,7 @@ def _in_si(table: LoggerTable, time_s: Array, samples: Array, unit: str | None, 
             found.size * ACCELERATION_UNITS[one] / of_g - 1) < GRAVITY_WITHIN), None) if not is_linear else None
         also = f", or, if the unit {unit} is wrong, name it: {named.removesuffix('UNIT')}{likely}" if likely else ""
         raise BadInput(f"{path}: expected gravity in the accelerations, by which to level them, found a mean of "
-                       f"{size_mps2:.3g} m/s2: record with gravity (\"with g\", total or raw acceleration), or record "
+                       f"{size_mps2:.3g} m/s2. Record with gravity (\"with g\", total or raw acceleration), or record "
                        f"gravity as well, or name the axis that points up: --up z (or -z, x, ...){also}")
     return samples, False
 
@@ -527,7 +527,7 @@ def check_speed(table: LoggerTable, fixes: Fixes) -> None:
     ratio = way_over_speed(fixes.time_s, fixes.lat_deg, fixes.lon_deg, fixes.speed_mps)
     if ratio is not None:
         raise BadInput(f"{table.header.path}: expected a speed in {table.unit('speed')} that agrees with the places, "
-                       f"found places {ratio:.2g} times as far apart: name its unit in --columns, speed="
+                       f"found places {ratio:.2g} times as far apart. Name its unit in --columns, speed="
                        f"{table.known.columns['speed'].header}:UNIT, one of {', '.join(SPEED_UNITS)}; or name t and "
                        "speed alone, to go without the places")
 

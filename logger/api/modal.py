@@ -179,8 +179,8 @@ def _check_stands(given: record_checks.ChannelRecord | Path | str, question: Mod
     if drives and question.input_column is None and question.method not in _ONLY_DECAYS:
         raise question.complaint(
             f"{name_of(given)}: expected `vehicle` with a drive: the road, and the second axle that "
-            "follows the first, put peaks into its spectrum that are no modes; a stretch that rings freely can be "
-            "looked at with `method` era")
+            "follows the first, put peaks into its spectrum that are no modes. A stretch of free decay can be "
+            "analysed with `method` era")
 
 
 def _check(question: ModesQuestion) -> None:

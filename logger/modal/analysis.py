@@ -169,7 +169,7 @@ def _excitation(inputs: Array, rate_hz: float, lags: int) -> int:
         strongest_hz = float(power.argmax()) * rate_hz / len(inputs)
         raise ValueError(
             f"expected an input with many frequencies, found {(count + 1) // 2} (the strongest {strongest_hz:.3g} Hz): "
-            f"its order of excitation is {count}, and one mode takes persistent excitation of order {one_mode}; drive "
+            f"its order of excitation is {count}, and one mode takes persistent excitation of order {one_mode}. Drive "
             "the structure with a sweep or noise, or leave the input out")
     return count
 

@@ -342,10 +342,9 @@ def _curves_view() -> doc.Html:
                     "to window, with Shift they choose a range; plus and minus zoom, 0 shows all. The table of all "
                     'windows below holds the same values."></canvas><canvas class="over" aria-hidden="true"></canvas>'
                     "</div>") + doc.hint(
-            "The shaded band is the IRI plus and minus its standard error. Where many windows share a pixel of the "
-            "picture, the line is their mean, weighted by length, the band is the mean standard error of one window, "
-            "and a grey stroke reaches up to the worst of them. Dotted: lower limits of the IRI classes, and of "
-            "discomfort "
+            "The shaded band is the IRI plus and minus its standard error. Where many windows share a pixel, "
+            "the line is their mean, weighted by length, and the band is the mean standard error of one window. A grey "
+            "stroke reaches up to the worst of them. Dotted: lower limits of the IRI classes, and of discomfort "
             "(fairly, very, extreme). The strip at the bottom: orange where a window carries a flag, grey where it has "
             "no usable value.")
 

@@ -145,9 +145,9 @@ _DOWNLOAD = "download doi 10.5281/zenodo.4386256 (CC0) and unpack it into one fo
 STUDY = Study(
     "zenodo_4386256", "Phones at 100 Hz against laser profiles, 10 m and 100 m", "Three roads",
     "Each trip is processed as any recording: extract --csv --profile aligns it with the laser profile, by the "
-    "phone's places and then by the road that the car felt; estimate compares its windows with the profile's exact "
-    "IRI. The cars' parameters are not published: the model of a sedan replaces them, unless --vehicle names another. "
-    "The reader is tested on small files of the same layout.",
+    "phone's places and then by the road that the car felt. Then estimate compares its windows with the profile's "
+    "exact IRI. The cars' parameters are not published: the model of a sedan replaces them, unless --vehicle names "
+    "another. The reader is tested on small files of the same layout.",
     road_sets.from_folder("Zenodo 4386256", _DOWNLOAD, run),
     (Item("Zenodo 4386256", Word.NOT_REPRODUCIBLE, road_sets.NOT_RUN),),
     source="Botshekan et al., Zenodo 4386256, 2021", data=f"Zenodo 4386256 ({_DOWNLOAD})")

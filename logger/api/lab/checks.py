@@ -486,7 +486,7 @@ def check_channels(drive: Drive, file: Path, vehicle: Vehicle) -> None:
     for signal, samples in ((signal, every[whole]) for signal, every in to_judge):
         if (share := float(at_ends(samples).mean())) > _CLIPPED_SHARE:
             raise BadInput(f"{file}: {signal.name}: expected readings, found {share:.0%} of them at the largest and "
-                           "the smallest one exactly, as from a saturated amplifier: set its range wider, or add a "
+                           "the smallest one exactly, as from a saturated amplifier. Set a wider range, or add a "
                            "column usable, 2 there and 1 elsewhere (1 everywhere if this is right)")
         if signal.measures == "force" and (still := longest_still(samples, drive.rate_hz)):
             from_s, to_s = (float(drive.time_s[whole][min(one, len(samples) - 1)]) for one in still)

@@ -87,8 +87,8 @@ _DOWNLOAD = "download SilverboxFiles.zip from nonlinearbenchmark.org and unpack 
 STUDY = Study(
     "silverbox", "A mass on a hardening spring: what its model lacks, and how well it then predicts",
     "Errors of the benchmark's tests", "The record is written as a user would: run folders with the force and the "
-    "displacement, and a file of a single mass whose mass and spring are known to 20 % and its damper to 50 %. "
-    f"diagnose and add-effect see the first {FITTED} samples of the part for fitting, and nothing of the tests. The "
+    "displacement. The file of a single mass knows mass and spring to 20 % and the damper to 50 %. "
+    f"The lab sees the first {FITTED} samples of the part for fitting, and nothing of the tests. The "
     f"first {_SKIP} samples of each test are left out, as published.",
     rig_sets.rig_from_folder("the Silverbox", _DOWNLOAD, run),
     (Item("Silverbox equation", Word.AGREES, "diagnose names the cubic spring of the circuit."),
