@@ -45,8 +45,3 @@ def left_out_lines(found: Iterable[LeftOut]) -> list[str]:
     """One line, or none where all was used."""
     there = counting(found)
     return [f"Not used: {'; '.join(one.words for one in there)}."] if there else []
-
-
-def left_out_paragraph(found: Iterable[LeftOut]) -> list[str]:
-    """The same below a blank line."""
-    return ["", *said] if (said := left_out_lines(found)) else []

@@ -21,6 +21,7 @@ import textwrap
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import MISSING, dataclass, field, fields
+from functools import cached_property
 from numbers import Integral, Real
 from os import PathLike
 from pathlib import Path
@@ -508,11 +509,16 @@ def help_of(question: type[Any]) -> str:
 class Answer:
     """What a command says.
 
-    text    the lines that it prints; empty: none
+    told    the lines that it prints, or blocks (``logger.report.blocks.Told``); empty: none
     """
 
-    text: str
+    told: object
     _json: dict[str, Any] = field(repr=False)
+
+    @cached_property
+    def text(self) -> str:
+        """The lines that it prints."""
+        return str(self.told)
 
     def __repr__(self) -> str:
         return self.text

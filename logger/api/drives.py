@@ -38,6 +38,7 @@ from logger.files import make_folder, together, write_text
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.question import Notify, function, silent
+from logger.report.blocks import Block, Hint, Lines, Table, Told
 from logger.report.quantities import known
 from logger.runs import SKIP_S, UNKNOWN, Past, past_of
 from logger.runs import Run as Record
@@ -294,8 +295,8 @@ def estimated(question: EstimateQuestion) -> Estimate:
     summary = as_json(str(drive.path), found) | checks_json(checked)
     windows = found.windows
     parts = found.road.parts if found.road else ()
-    text = "\n".join([*checks_lines(checked), *lines(found, summary)])
-    return Estimate(text, summary, found, summary.get("iri_m_per_km", np.nan), windows.edges_m,
+    told = Told([Lines(checks_lines(checked)), *blocks(found, summary)])
+    return Estimate(told, summary, found, summary.get("iri_m_per_km", np.nan), windows.edges_m,
                     windows.speed_mps, windows.iri_m_per_km, windows.iri_std_m_per_km, found.exact_m_per_km,
                     found.least_error_m_per_km, windows.flags,
                     tuple(Profile(one.start_m, one.spacing_m, one.elevation_m, None) for one in parts),
@@ -407,8 +408,8 @@ def window_lines(found: Assessment) -> Iterator[str]:
 # --- for a person ---
 
 
-def lines(found: Assessment, summary: dict[str, Any]) -> list[str]:
-    """The lines a person sees; ``summary``: the same as JSON."""
+def blocks(found: Assessment, summary: dict[str, Any]) -> Iterator[Block]:
+    """What a person sees; ``summary``: the same as JSON."""
     way_m = summary["distance_end_m"] - summary["distance_start_m"]
     details = [
         f"{summary['run']}: {way_m:.0f} m in a {summary['vehicle']}, "
@@ -424,7 +425,8 @@ def lines(found: Assessment, summary: dict[str, Any]) -> list[str]:
                        "changes it.")
     doubts = [hint] if (hint := _unit_hint(found)) else []
     if not summary["answered_count"]:
-        return [f"No IRI: {_unanswered(summary) or 'the drive is shorter than one window'}", *doubts, *details]
+        yield Lines([f"No IRI: {_unanswered(summary) or 'the drive is shorter than one window'}", *doubts, *details])
+        return
     limit = summary["limit"]
     limits = [
         "The limit, an estimator that knows road, car and noise exactly: standard error "
@@ -439,7 +441,10 @@ def lines(found: Assessment, summary: dict[str, Any]) -> list[str]:
               f"{summary['iri_max_m_per_km']:.2f}; standard error of one window {summary['iri_std_m_per_km']:.2f}; "
               f"{summary['answered_count']} of {summary['window_count']} windows"
               + (f" ({_unanswered(summary)})" if summary["unanswered"] else "") + ".")
-    return [answer, *doubts, "", *_table(summary), "", *limits, "", *details]
+    yield Lines([answer, *doubts])
+    yield from _table(summary)
+    yield Lines(limits)
+    yield Lines(details)
 
 
 def _sensor_lines(summary: dict[str, Any]) -> list[str]:
@@ -484,21 +489,22 @@ def _range_words(found: Assessment) -> str:
             f"a profile holds these{left_out}.")
 
 
-def _table(summary: dict[str, Any]) -> Iterator[str]:
+def _table(summary: dict[str, Any]) -> Iterator[Block]:
     """Per class of speed: the estimates, then the comparison where there is one."""
-    compared = "comparison" in summary
-    yield (f"{'m/s':>10}{'windows':>9}{'with IRI':>10}{'IRI':>8}{'std. error':>12}{'limit':>8}"
-           + (f"   {'R2':>7}{'limit':>7}{'bias':>8}{'in 1':>7}{'in 2':>6}" if compared else ""))
+    rows = []
     total = [{"from_mps": None, **summary}] if len(summary["speeds"]) > 1 else []
     for row in [*summary["speeds"], *total]:
-        name = "all" if row["from_mps"] is None else f"{row['from_mps']:.0f} to {row['to_mps']:.0f}"
-        line = f"{name:>10}{row['window_count']:9d}{row['answered_count']:10d}"
+        iri, beside = ("",) * 3, ("",) * 5
         if row["answered_count"]:
-            line += f"{row['iri_m_per_km']:8.2f}{row['iri_std_m_per_km']:12.3f}{row['limit']['std_m_per_km']:8.3f}"
+            iri = (f"{row['iri_m_per_km']:.2f}", f"{row['iri_std_m_per_km']:.3f}",
+                   f"{row['limit']['std_m_per_km']:.3f}")
         if found := row.get("comparison"):
-            line += (f"   {found['r2']:7.3f}{found['limit_r2']:7.3f}{found['bias']:+8.1%}{found['within_one']:7.2f}"
-                     f"{found['within_two']:6.2f}")
-        yield line
-    if compared:
-        yield ("R2 against the profile; in 1, in 2: share of windows within one and two standard errors (ideal: 0.68, "
-               "0.95).")
+            beside = (f"{found['r2']:.3f}", f"{found['limit_r2']:.3f}", f"{found['bias']:+.1%}",
+                      f"{found['within_one']:.2f}", f"{found['within_two']:.2f}")
+        name = "all" if row["from_mps"] is None else f"{row['from_mps']:.0f} to {row['to_mps']:.0f}"
+        rows.append((name, f"{row['window_count']}", f"{row['answered_count']}", *iri, *beside))
+    yield Table(("m/s", "windows", "with IRI", "IRI", "std. error", "limit", "R2", "limit", "bias", "in 1", "in 2"),
+                rows)
+    if "comparison" in summary:
+        yield Hint("R2 against the profile; in 1, in 2: share of windows within one and two standard errors (ideal: "
+                   "0.68, 0.95).")

@@ -40,6 +40,7 @@ from logger.identification.unknown_car import (
 )
 from logger.printable import counted
 from logger.question import function
+from logger.report.blocks import Block, Hint, Lines, Section, Table, Told
 from logger.runs import READING
 from logger.service.config import Config
 from logger.shipped import vehicle_names, vehicle_path
@@ -403,12 +404,14 @@ def _answer(question: LearnCarQuestion, used: Sequence[_Used], problem: UnknownC
         "kept_back": errors, "sprung_mass_kg": mass, "mass_is_convention": question.mass_kg is None,
         "converged": car.is_converged, "not_identifiable": unknown,
         "effects_missing": list(missing), "changes": moved, "other_than_settings": misfits}
-    lines = [*_head(used, problem, seconds), "", *_table(values, deviations), "", *_iri_lines(now, ever), "",
-             *_kept_lines(errors), _mass_line(question, mass), *_warnings(problem, car, values, deviations),
-             *missing, *unknown, *moved, *misfits]
-    comments = "".join(f"# {line}\n".replace("# \n", "#\n") for line in
-                       [f"Learnt by ridelog learn-car from {len(used)} drives, {seconds / 60:.0f} min.", *lines])
-    return LearnedVehicle("\n".join(lines), as_json, model, values, deviations, now, ever,
+    told = Told([Lines([*_head(used, problem, seconds)]), _table(values, deviations),
+            Hint("Usual cars: bounce at 1 to 1.5 Hz, damping ratios 0.2 to 0.4, wheel hop at 10 to 14 Hz."),
+            *_iri_blocks(now, ever),
+            Lines([*_kept_lines(errors), _mass_line(question, mass), *_warnings(problem, car, values, deviations),
+                   *missing, *unknown, *moved, *misfits])])
+    comments = "".join(f"# {line}\n".replace("# \n", "#\n") for line in [
+        f"Learnt by ridelog learn-car from {len(used)} drives, {seconds / 60:.0f} min.", *str(told).split("\n")])
+    return LearnedVehicle(told, as_json, model, values, deviations, now, ever,
                           tuple(_charts(problem, car)), comments)
 
 
@@ -458,22 +461,21 @@ def _head(used: Sequence[_Used], problem: UnknownCar, seconds: float) -> Iterato
            f"{3.6 * speeds.min():.0f} to {3.6 * speeds.max():.0f} km/h")
 
 
-def _table(values: Mapping[str, float], deviations: Mapping[str, float]) -> Iterator[str]:
-    yield f"{'':26}{'front':>18}{'rear':>18}"
+def _table(values: Mapping[str, float], deviations: Mapping[str, float]) -> Table:
     cells = {name: f"{value:.3f} ± {deviations[name]:.3f}" for name, value in values.items()}
-    for name in (one.removeprefix("front.") for one in cells if one.startswith("front.")):
-        yield f"  {_with_unit(name):24}{cells[f'front.{name}']:>18}{cells[f'rear.{name}']:>18}"
-    for name in (one for one in cells if "." not in one):
-        yield f"  {_with_unit(name):42}{cells[name]:>18}"
-    yield ("Usual cars: bounce at 1 to 1.5 Hz, damping ratios 0.2 to 0.4, wheel hop at 10 to 14 Hz.")
+    by_axle = [one.removeprefix("front.") for one in cells if one.startswith("front.")]
+    return Table(("", "front", "rear"), [
+        *((_with_unit(name), cells[f"front.{name}"], cells[f"rear.{name}"]) for name in by_axle),
+        *((_with_unit(name), "", cells[name]) for name in cells if "." not in name)])
 
 
-def _iri_lines(now: Mapping[float, float], ever: Mapping[float, float]) -> Iterator[str]:
-    yield "Standard error of the IRI because of the car [%]:"
-    yield f"  {'at km/h':26}" + "".join(f"{3.6 * speed:7.0f}" for speed in now)
-    yield f"  {'any car of this wheelbase':26}" + "".join(f"{100 * value:7.0f}" for value in ever.values())
-    yield f"  {'this car':26}" + "".join(f"{100 * value:7.1f}" for value in now.values())
-    yield ("It includes dampers up to twice as hard in rebound as in compression, which such drives do not show.")
+def _iri_blocks(now: Mapping[float, float], ever: Mapping[float, float]) -> list[Block]:
+    return [
+        Section("Standard error of the IRI because of the car [%]", [
+            Table(("at km/h", *(f"{3.6 * speed:.0f}" for speed in now)), [
+                ("any car of this wheelbase", *(f"{100 * value:.0f}" for value in ever.values())),
+                ("this car", *(f"{100 * value:.1f}" for value in now.values()))])]),
+        Hint("It includes dampers up to twice as hard in rebound as in compression, which such drives do not show.")]
 
 
 def _kept_lines(errors: Mapping[str, Any]) -> Iterator[str]:

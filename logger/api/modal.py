@@ -6,7 +6,7 @@ Vibration records of many sensors; a car's modes out of a drive, from its file, 
 from __future__ import annotations
 
 from cmath import phase
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import degrees, floor, isfinite, log10
 from pathlib import Path
@@ -30,6 +30,7 @@ from logger.modal.driven_car import car_modes
 from logger.modal.mode import FoundMode, ModalResult, pole_rows
 from logger.printable import counted
 from logger.question import COMMON_IRI, COMMON_SPEED_MPS, IRI, SPEED, function
+from logger.report.blocks import Block, Lines, Section, Table, Told
 from logger.report.quantities import known
 from logger.runs import READING, SKIP_S
 from logger.store.formats import record_checks
@@ -103,7 +104,7 @@ def _modes_by(found: Found, name: str) -> Modes:
         np.array([getattr(one, column) for one in many], dtype=np.float64)
         for column in ("frequency_hz", "frequency_std_hz", "damping_ratio", "damping_std"))
     return Modes(
-        "\n".join(lines(result, kept, name)), as_json(result, kept, found.method), kept.names, frequency_hz,
+        Told(blocks(result, kept, name)), as_json(result, kept, found.method), kept.names, frequency_hz,
         frequency_std_hz, damping_ratio, damping_std,
         np.array([one.shape for one in many], dtype=np.complex128).reshape(len(many), len(kept.names)),
         tuple((one.frequency_hz, one.reason) for one in result.rejected), result.how, result.order, pole_rows(result))
@@ -153,8 +154,8 @@ def vehicle_modes(
                np.array([one.damping_ratio for one in found]), damping_std)
     at = f", at {speed_mps:g} m/s on a road of {iri_m_per_km:g} m/km" if known.depends_on_motion else ""
     rows = list(zip(*(one.tolist() for one in columns), strict=True))
-    text = [f"{model.vehicle.name}{at}", _HEADS, *(_mode_line(*row) for row in enumerate(rows, start=1))]
-    return VehicleModes("\n".join(text), {"modes": [_mode_json(*row) for row in rows]}, *columns)
+    told = Told([Lines([f"{model.vehicle.name}{at}"]), Table(_HEADS, list(_mode_rows(rows)))])
+    return VehicleModes(told, {"modes": [_mode_json(*row) for row in rows]}, *columns)
 
 
 def found_modes(given: record_checks.ChannelRecord | Path | str, question: ModesQuestion) -> Found:
@@ -397,35 +398,30 @@ def _mode_json(hz: float, hz_std: float, ratio: float, ratio_std: float) -> dict
             "damping_std": known(ratio_std)}
 
 
-_HEADS = "mode   frequency Hz           damping %"
+_HEADS = ("mode", "frequency Hz", "damping %")
 
 
-def _mode_line(number: int, mode: tuple[float, float, float, float]) -> str:
-    hz, hz_std, ratio, ratio_std = mode
-    return f"{number:4}   {with_error(hz, hz_std):22} {with_error(100 * ratio, 100 * ratio_std)}"
+def _mode_rows(modes: Iterable[tuple[float, float, float, float]]) -> Iterator[tuple[str, str, str]]:
+    for number, (hz, hz_std, ratio, ratio_std) in enumerate(modes, start=1):
+        yield str(number), with_error(hz, hz_std), with_error(100 * ratio, 100 * ratio_std)
 
 
-def lines(result: ModalResult, record: ChannelRecord, name: str) -> list[str]:
+def blocks(result: ModalResult, record: ChannelRecord, name: str) -> Iterator[Block]:
     """What a person reads; ``name`` is that of the file."""
     seconds = len(record.samples) / record.rate_hz
     order = f", order {result.order}" if result.order else ""
-    shown = [f"{name}: {seconds:.4g} s at {record.rate_hz:.6g} Hz, "
-             f"{counted(len(record.names), 'channel')}",
-             f"{result.how}{order}", ""]
+    yield Lines([f"{name}: {seconds:.4g} s at {record.rate_hz:.6g} Hz, {counted(len(record.names), 'channel')}",
+                 f"{result.how}{order}"])
     if result.modes:
-        said = [_mode_line(number, (one.frequency_hz, one.frequency_std_hz, one.damping_ratio, one.damping_std))
-                for number, one in enumerate(result.modes, start=1)]
-        shown += [f"{words:51} {shape}" for words, shape in zip(
-            [_HEADS, *said], ["shape", *map(_shape_words, result.modes)], strict=True)]
-        shown += ["", f"± is one standard deviation. Shape: {', '.join(record.names)[:200]}; the largest is 1."]
+        said = _mode_rows((one.frequency_hz, one.frequency_std_hz, one.damping_ratio, one.damping_std)
+                          for one in result.modes)
+        yield Table((*_HEADS, "shape"), [(*row, _shape_words(one)) for row, one in
+                                         zip(said, result.modes, strict=True)], (3,))
+        yield Lines([f"± is one standard deviation. Shape: {', '.join(record.names)[:200]}; the largest is 1."])
     else:
-        shown.append("No mode: nothing in this record exceeds noise.")
-    if result.rejected:
-        shown += ["", "Rejected:"]
-        shown += [f"  {one.frequency_hz:9.4g} Hz  {one.reason}" for one in result.rejected[:_REJECTED_SHOWN]]
-        if len(result.rejected) > _REJECTED_SHOWN:
-            shown.append(f"  and {len(result.rejected) - _REJECTED_SHOWN} more")
-    return shown
+        yield "No mode: nothing in this record exceeds noise."
+    yield Section("Rejected", [Table(("Hz", ""), [
+        (f"{one.frequency_hz:.4g}", one.reason) for one in result.rejected], (1,), _REJECTED_SHOWN)])
 
 
 def with_error(value: float, std: float) -> str:

@@ -21,14 +21,15 @@ from logger.chart_data import Array, Chart, Curves, Line
 from logger.comfort.iso2631 import comfort_word
 from logger.errors import BadInput
 from logger.exchange.layer import Feature, Layer, attributes, cut, half_way, iri_title, write_layer
-from logger.left_out import left_out_json, left_out_paragraph
+from logger.left_out import left_out_json, left_out_lines
 from logger.printable import counted
 from logger.question import function
 from logger.records import WindowRecord
-from logger.report.document import EMPTY, Html, grid, hint, html, map_links, paragraphs, section
+from logger.report.blocks import Block, Hint, Lines, Linked, Section, Table, Told, elements
+from logger.report.document import Html, hint, map_links, section
 from logger.report.page import number_button, page
 from logger.report.placed import column, iri_errors, of_passes, placed, trace_of
-from logger.report.quantities import columns, known
+from logger.report.quantities import known
 from logger.report.summary import comfort_words, counts
 from logger.roads.iso8608 import iri_class
 from logger.roads.repeated_drives import (
@@ -117,7 +118,7 @@ def combined(question: PassesQuestion) -> RepeatedDrives:
                             None if split_us is None else split_us / US_PER_S)
     left = of_passes(files, records, found.placed)
     return RepeatedDrives(
-        "\n".join([*lines(found), *left_out_paragraph(left)]), as_json(found) | left_out_json(left),
+        Told([*blocks(found), Lines(left_out_lines(left))]), as_json(found) | left_out_json(left),
         found.iri.drives, found.iri.iri_m_per_km, found.iri.iri_std_m_per_km,
         found.a_w_mps2, found.lat_deg, found.lon_deg, found.heading_deg, found)
 
@@ -249,13 +250,25 @@ SIGNIFICANT = 0.05
 MOST_VISITS, MOST_CHANGES = 20, 20
 
 
-def lines(found: CombinedDrives) -> list[str]:
-    """For a person."""
-    cells = len(found.iri.key)
-    if not cells:
-        return ["No row has a position and an IRI with its standard error, so drives cannot be combined."]
-    changes = change_lines(found)
-    return [*changes, *([""] if changes else []), *_summary(found), *_passes_visits(found)]
+def blocks(found: CombinedDrives, marked: Sequence[int] = ()) -> Iterator[Block]:
+    """For a person; ``marked``: rows of a page that its numbers show."""
+    if not len(found.iri.key):
+        yield "No row has a position and an IRI with its standard error, so drives cannot be combined."
+        return
+    if found.change is not None:
+        yield from _change_blocks(found, found.change)
+    yield Lines(list(_summary(found)))
+    yield hint("Below, each piece of road appears once, with the mean of all drives over it: its time is that of the "
+               "last drive, its speed their mean.")
+    if not found.visits:
+        yield Section("Work list", ["No place is above a limit with enough confidence."])
+        return
+    yield Section("Work list", [
+        Table(_VISIT_HEADS, [
+            (_number(number, marked), one.kind, _place(found, one.worst), *_visit_cells(found, one))
+            for number, one in enumerate(found.visits, start=1)], (0, 1, 2, 3, 7), MOST_VISITS,
+            ": --visit FILE writes all of them"), Hint(f"Rough: above {found.above_m_per_km:.2f} m/km."),
+        hint("A place has its number in all tables, on the map and in the curves.")])
 
 
 def _summary(found: CombinedDrives) -> Iterator[str]:
@@ -279,26 +292,20 @@ def _summary(found: CombinedDrives) -> Iterator[str]:
                "(tires, load, temperature)")
 
 
-def _passes_visits(found: CombinedDrives) -> Iterator[str]:
-    yield ""
-    if not found.visits:
-        yield "Work list: empty; no place is above a limit with enough confidence."
-        return
-    yield f"Work list: {counted(len(found.visits), 'place')}"
-    yield from columns([_VISIT_HEADS, *(
-        (str(number), one.kind, _coordinates(found, one.worst), *_visit_cells(found, one))
-        for number, one in enumerate(found.visits[:MOST_VISITS], start=1))])
-    if len(found.visits) > MOST_VISITS:
-        yield f"... and {len(found.visits) - MOST_VISITS} more: --visit FILE writes all of them"
-
-
 _VISIT_HEADS = ("#", "What", "Worst piece at", "Towards", "Length [m]", "IRI [m/km]", "a_w [m/s²]",
                 "Perception", "Confidence", "Drives")
 _CHANGE_HEADS = ("#", "Change", "Coordinates", "Towards", "Change of the IRI [m/km]", "p", "Drives before", "after")
 
 
-def _coordinates(found: CombinedDrives, cell: int) -> str:
-    return f"{found.lat_deg[cell]:.6f}, {found.lon_deg[cell]:.6f}"
+def _place(found: CombinedDrives, cell: int) -> Linked:
+    lat_deg, lon_deg = float(found.lat_deg[cell]), float(found.lon_deg[cell])
+    words = f"{lat_deg:.6f}, {lon_deg:.6f}"
+    return Linked(words, map_links(lat_deg, lon_deg, words))
+
+
+def _number(number: int, marked: Sequence[int]) -> str:
+    """Of a place to visit, the first of which a page shows where they are pointed at."""
+    return Linked(str(number), number_button(marked[number - 1], number)) if number <= len(marked) else str(number)
 
 
 def _visit_cells(found: CombinedDrives, one: PlaceToVisit) -> tuple[str, ...]:
@@ -317,27 +324,22 @@ def _change_cells(found: CombinedDrives, change: Changes, one: int, cell: int) -
             str(change.before[one]), str(change.after[one]))
 
 
-def change_lines(found: CombinedDrives) -> list[str]:
-    """What changed between two periods: how much of the road, and the largest changes, a line each."""
-    return [] if found.change is None else list(_passes_changes(found, found.change))
-
-
-def _passes_changes(found: CombinedDrives, change: Changes) -> Iterator[str]:
+def _change_blocks(found: CombinedDrives, change: Changes) -> Iterator[Block]:
+    """What changed between two periods: how much of the road, and the largest changes."""
     if not len(change.key):
         yield ("No change can be measured: no piece of road was passed in both periods (rows without a date are in "
                "neither).")
         return
     words = [changed(change, one) for one in range(len(change.key))]
     worse, better = words.count("worse"), words.count("better")
-    yield (f"Between the two periods the IRI of {counted(len(change.key), 'piece')} of {found.length_m:g} m changed by "
-           f"{change.mean_m_per_km:+.3f} ± {change.mean_std_m_per_km:.3f} m/km on average")
-    yield (f"{worse} of them got worse, {better} better (at most {SIGNIFICANT:.0%} of these by chance; Benjamini & "
-           "Hochberg)")
-    if worse or better:
-        cells = np.searchsorted(found.iri.key, change.key).tolist()
-        yield from columns([_CHANGE_HEADS, *(
-            (place_number(found, cells[one]), changed(change, one), _coordinates(found, cells[one]),
-             *_change_cells(found, change, one, cells[one])) for one in largest_changes(change))])
+    yield Lines([f"Between the two periods the IRI of {counted(len(change.key), 'piece')} of {found.length_m:g} m "
+                 f"changed by {change.mean_m_per_km:+.3f} ± {change.mean_std_m_per_km:.3f} m/km on average",
+                 f"{worse} of them got worse, {better} better (at most {SIGNIFICANT:.0%} of these by chance; Benjamini "
+                 "& Hochberg)"])
+    cells = np.searchsorted(found.iri.key, change.key).tolist()
+    yield Table(_CHANGE_HEADS, [
+        (place_number(found, cells[one]), words[one], _place(found, cells[one]),
+         *_change_cells(found, change, one, cells[one])) for one in largest_changes(change)], (0, 1, 2, 3))
 
 
 def changed(change: Changes, one: int) -> str:
@@ -457,10 +459,7 @@ def passes_page(found: CombinedDrives) -> Html:
     order = [cell for chain in chains(found) for cell in chain.tolist()]
     rows = [order.index(one.worst) for one in found.visits[:MOST_VISITS]]
     return page([LoggedFile("means of drives", tuple(_rows(found)), 0, {})], title=title, marked=rows or None, first=(
-        section("Repeated drives combined", paragraphs(list(_summary(found))) + hint(
-            "Below, each piece of road appears once, with the mean of all drives over it: its time is that of the last "
-            "drive, its speed their mean.")), section("What changed between the two periods", _page_changes(found)),
-        section("Work list", _page_visits(found, rows))))
+        section("Repeated drives combined", elements(blocks(found, rows))),))
 
 
 def _days(found: CombinedDrives) -> str:
@@ -468,29 +467,6 @@ def _days(found: CombinedDrives) -> str:
         return "dates not known"
     first, last = (utc(round(one * US_PER_S)) for one in (np.nanmin(found.iri.first_s), np.nanmax(found.iri.last_s)))
     return f"{first:%Y-%m-%d}" if first.date() == last.date() else f"{first:%Y-%m-%d} to {last:%Y-%m-%d}"
-
-
-def _page_changes(found: CombinedDrives) -> Html:
-    if found.change is None:
-        return EMPTY
-    change, cells = found.change, np.searchsorted(found.iri.key, found.change.key).tolist()
-    rows = [(place_number(found, cells[one]), changed(change, one), _link(found, cells[one]),
-             *_change_cells(found, change, one, cells[one])) for one in largest_changes(change)]
-    return paragraphs(change_lines(found)[:2]) + (grid(_CHANGE_HEADS, rows, words=(0, 1, 2, 3)) if rows else EMPTY)
-
-
-def _page_visits(found: CombinedDrives, marked: list[int]) -> Html:
-    if not found.visits:
-        return paragraphs(["No place is above a limit with enough confidence."])
-    rows = [(number_button(marked[number - 1], number) if number <= len(marked) else str(number), one.kind,
-             _link(found, one.worst), *_visit_cells(found, one)) for number, one in enumerate(found.visits, start=1)]
-    return html('<div id="places">{}</div>', grid(_VISIT_HEADS, rows, words=(0, 1, 2, 3, 7))) + hint(
-        f"Rough: above {found.above_m_per_km:.2f} m/km. A place has its number in all tables, on the map and in the "
-        "curves.")
-
-
-def _link(found: CombinedDrives, cell: int) -> Html:
-    return map_links(float(found.lat_deg[cell]), float(found.lon_deg[cell]), _coordinates(found, cell))
 
 
 def _rows(found: CombinedDrives) -> Iterator[WindowRecord]:

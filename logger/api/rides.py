@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
 from pathlib import Path
@@ -33,6 +33,7 @@ from logger.dsp.weightings.weighting import Weighting
 from logger.errors import BadInput
 from logger.plugins import catalogue
 from logger.question import function
+from logger.report.blocks import Block, Lines, Table, Told
 from logger.report.quantities import known
 from logger.runs import UNKNOWN, RecordFacts
 from logger.store.formats import drive_file, record_file
@@ -156,7 +157,8 @@ def comfort_of(question: ComfortQuestion) -> Comfort:
         hint = f" (--resample takes {LEAST_TAKEN_HZ:g} or more)" if can_be_laid else ""
         raise BadInput(f"{name}: {error}{hint}") from None
     summary, vertical = as_json(found) | checks_json(ride), found.vertical
-    return Comfort("\n".join(lines(found, Path(name).name) + checks_lines(ride)), summary, used.name,
+    told = Told([*blocks(found, Path(name).name), Lines(checks_lines(ride))])
+    return Comfort(told, summary, used.name,
                    vertical.a_w_mps2, vertical.mtvv_mps2, vertical.vdv_mps175, vertical.crest_factor,
                    summary["comfort"], found.weighted_mps2, ride.rate_hz,
                    tuple(doubt.words for doubt in ride.doubts))
@@ -256,28 +258,26 @@ def _zone(zone: CautionZone, value: float, unit: str) -> dict[str, Any]:
     return {f"lower_{unit}": zone.lower, f"upper_{unit}": zone.upper, "verdict": zone.verdict(value)}
 
 
-def lines(result: RideComfort, name: str) -> list[str]:
-    """The lines a person sees; ``name`` is that of the file."""
+def blocks(result: RideComfort, name: str) -> Iterator[Block]:
+    """What a person sees; ``name`` is that of the file."""
     answer, *conclusions = _conclusions(result)
-    printed = [answer, "", f"{name}: {result.vertical.duration_s:.1f} s at {result.rate_hz:.6g} Hz, "
-             f"weighting {result.weighting.name.capitalize()}", ""]
-    heads = ("axis", "a_w m/s2", "MTVV m/s2", "VDV m/s1.75", "crest", "MTVV/a_w", "VDV/a_wT^1/4")
-    printed.append(f"{heads[0]:5}" + "".join(f"{head:>13}" for head in heads[1:]))
-    for axis in sorted(result.axes):
-        figures = result.axes[axis]
-        values = (figures.a_w_mps2, figures.mtvv_mps2, figures.vdv_mps175, figures.crest_factor, figures.mtvv_ratio,
-                  figures.vdv_ratio)
-        printed.append(f"{axis:5}" + "".join(f"{value:13.3f}" if isfinite(value) else f"{'-':>13}"
-                                                  for value in values))
-    exponential = ", ".join(f"{result.axes[axis].mtvv_exponential_mps2:.3f}" for axis in sorted(result.axes))
-    printed += [f"MTVV with exponential averaging: {exponential} m/s2", "", *conclusions, "",
-              f"Method: {METHOD}; the mean is removed."]
+    yield Lines([answer])
+    yield Lines([f"{name}: {result.vertical.duration_s:.1f} s at {result.rate_hz:.6g} Hz, weighting "
+                 f"{result.weighting.name.capitalize()}"])
+    by_axis = sorted(result.axes.items())
+    yield Table(("axis", "a_w m/s2", "MTVV m/s2", "VDV m/s1.75", "crest", "MTVV/a_w", "VDV/a_wT^1/4"), [
+        (axis, *(f"{value:.3f}" if isfinite(value) else "-" for value in (
+            one.a_w_mps2, one.mtvv_mps2, one.vdv_mps175, one.crest_factor, one.mtvv_ratio, one.vdv_ratio)))
+        for axis, one in by_axis])
+    exponential = ", ".join(f"{one.mtvv_exponential_mps2:.3f}" for _, one in by_axis)
+    yield Lines([f"MTVV with exponential averaging: {exponential} m/s2"])
+    yield Lines(conclusions)
+    yield Lines([f"Method: {METHOD}; the mean is removed."])
     if result.unseen_from_hz is not None:
-        printed.append(f"The record cannot show what lies above {result.unseen_from_hz:.4g} Hz. The standard counts it "
-                     f"up to {result.weighting.counts_up_to_hz:g} Hz; the values cover only what was recorded.")
+        yield Lines([f"The record cannot show what lies above {result.unseen_from_hz:.4g} Hz. The standard counts it "
+                     f"up to {result.weighting.counts_up_to_hz:g} Hz; the values cover only what was recorded."])
     if result.left_out:
-        printed.append("Other axes are combined only with Wk, x and y together; left out.")
-    return printed
+        yield Lines(["Other axes are combined only with Wk, x and y together; left out."])
 
 
 def _conclusions(result: RideComfort) -> list[str]:

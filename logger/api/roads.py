@@ -14,7 +14,8 @@ from logger.api.shown import CommandResult, Shown, table
 from logger.chart_data import Array, Chart, Curves, Line, line
 from logger.errors import BadInput
 from logger.question import function
-from logger.report.quantities import area_lines, area_values, measured
+from logger.report.blocks import Block, Lines, Table, Told, area_blocks
+from logger.report.quantities import area_values, measured
 from logger.report.summary import IRI_CLASSES
 from logger.roads import elevation_spectrum, iso8608
 from logger.roads.elevation_spectrum import BandedSpectrum, TrackClass, track_class
@@ -160,14 +161,14 @@ def iri_of(question: IriQuestion) -> Iri:
     ends_m = [0.0, *(window.distance_end_m for window in found.windows)]
     shown = found.columns.get("mri_m_per_km", found.columns["iri_m_per_km"])
     whole = found.row(0)
-    said, values = iri_lines(found, road, Path(name).name), iri_json(found, road)
+    told, values = iri_blocks(found, road, Path(name).name), iri_json(found, road)
     rough: tuple[Area, ...] = ()
     if localized_m_per_km is not None:
         middle_m, sliding = continuous_iri(road.elevation_m, road.elevation_right_m, road.spacing_m, WINDOW_M)
         rough = tuple(areas(road.start_m + middle_m, sliding, localized_m_per_km))
-        said += ["", *area_lines(rough, localized_m_per_km)]
+        told += area_blocks(rough, localized_m_per_km)
         values |= {"localized": [area_values(one) for one in rough]}
-    return Iri("\n".join(said), values, whole["iri_m_per_km"],
+    return Iri(Told(told), values, whole["iri_m_per_km"],
                whole.get("iri_right_m_per_km"), whole.get("mri_m_per_km"), whole.get("hri_m_per_km"),
                road.start_m + np.array(ends_m), shown[1:], road, rough)
 
@@ -221,8 +222,8 @@ def road_class_of(question: ClassifyQuestion) -> RoadClass:
         raise BadInput(f"{name}: {error}{spacing_hint(road.spacing_m)}") from None
     left = found[0].roughness
     return RoadClass("\n".join(class_lines(found, road, Path(name).name)), class_json(found), left.road_class,
-                     left.gd_n0_cm3,
-                     left.gd_n0_std_cm3, left.waviness, left.waviness_std, found[0].iri_m_per_km, left.bands)
+                     left.gd_n0_cm3, left.gd_n0_std_cm3, left.waviness, left.waviness_std, found[0].iri_m_per_km,
+                     left.bands)
 
 
 classify = function("classify", ClassifyQuestion, road_class_of)
@@ -257,7 +258,7 @@ def _roughest(result: ProfileIri) -> float:
 
 def _cut_short(result: ProfileIri) -> list[str]:
     """What is to be said of a profile that no window fits into."""
-    return ["The profile is shorter than one window (--window): its IRI is that of the whole profile.", ""] if (
+    return ["The profile is shorter than one window (--window): its IRI is that of the whole profile."] if (
         all(window.partial for window in result.windows)) else []
 
 
@@ -267,32 +268,30 @@ def _of_profile(profile: Profile, name: str) -> str:
             f"{profile.spacing_m * 1000:.4g} mm ({profile.spacing_m / FOOT_M * 12:.4g} in)")
 
 
-def iri_lines(result: ProfileIri, profile: Profile, name: str) -> list[str]:
-    """The lines a person sees; ``name`` is that of the file."""
+def iri_blocks(result: ProfileIri, profile: Profile, name: str) -> list[Block]:
+    """What a person sees; ``name`` is that of the file."""
     whole = result.row(0)
     first = "mri_m_per_km" if "mri_m_per_km" in whole else "iri_m_per_km"
     roughness = whole[first]
-    printed = [
-        ", ".join(f"{_HEADS[key]} {value:.3f} m/km ({value / INCH_PER_MILE_M_PER_KM:.1f} in/mi)"
-                      for key, value in whole.items()),
-        f"Roads like this: {', '.join(road_kinds(roughness)) or 'none of the usual'}",
-        f"Ride: {ride_words(roughness)}",
-        *([doubt] if (doubt := unit_doubt(_roughest(result))) else []),
-        "", *_cut_short(result),
-        f"{'from m':>10} {'to m':>10} {'from ft':>9} {'to ft':>9}"
-        + "".join(f" {_HEADS[key]:>10}" for key in whole) + f" m/km {'in/mi':>9}",
-    ]
+    rows = []
     for number, window in enumerate(result.windows, start=1):
         start_m, end_m = (profile.start_m + m for m in (window.distance_start_m, window.distance_end_m))
         row = result.row(number)
-        values = "".join(f" {value:10.3f}" for value in row.values())
-        printed.append(f"{start_m:10.2f} {end_m:10.2f} {start_m / FOOT_M:9.1f} {end_m / FOOT_M:9.1f}{values} "
-                       f"{row[first] / INCH_PER_MILE_M_PER_KM:14.1f}"
-                       + ("   partial" if window.partial else ""))
-    printed += ["", _of_profile(profile, name)]
-    if profile.widest_step_m is not None:
-        printed.append(f"Resampled: straight lines between samples up to {profile.widest_step_m:.3g} m apart.")
-    return printed
+        rows.append((f"{start_m:.2f}", f"{end_m:.2f}", f"{start_m / FOOT_M:.1f}", f"{end_m / FOOT_M:.1f}",
+                     *(f"{value:.3f}" for value in row.values()),
+                     f"{row[first] / INCH_PER_MILE_M_PER_KM:.1f}", "partial" if window.partial else ""))
+    heads = ("from m", "to m", "from ft", "to ft", *(f"{_HEADS[key]} m/km" for key in whole), "in/mi", "")
+    resampled = [] if profile.widest_step_m is None else [
+        f"Resampled: straight lines between samples up to {profile.widest_step_m:.3g} m apart."]
+    return [
+        Lines([
+            ", ".join(f"{_HEADS[key]} {value:.3f} m/km ({value / INCH_PER_MILE_M_PER_KM:.1f} in/mi)"
+                      for key, value in whole.items()),
+            f"Roads like this: {', '.join(road_kinds(roughness)) or 'none of the usual'}",
+            f"Ride: {ride_words(roughness)}",
+            *([doubt] if (doubt := unit_doubt(_roughest(result))) else [])]),
+        Lines(_cut_short(result)), Table(heads, rows, (len(heads) - 1,)),
+        Lines([_of_profile(profile, name), *resampled])]
 
 
 def class_json(tracks: Sequence[TrackClass]) -> dict[str, Any]:

@@ -20,12 +20,13 @@ from logger.chart_data import Array, Chart, Curves, Line
 from logger.comfort.iso2631 import comfort_word
 from logger.errors import BadInput
 from logger.exchange import layer
-from logger.left_out import left_out_json, left_out_paragraph
+from logger.left_out import left_out_json, left_out_lines
 from logger.printable import counted
 from logger.question import function
 from logger.records import WindowRecord
+from logger.report.blocks import Block, Lines, Section, Table, Told, area_blocks
 from logger.report.placed import column, iri_errors, of_sections, placed, trace_of
-from logger.report.quantities import UNITS, DisplayUnits, area_lines, area_values, known
+from logger.report.quantities import UNITS, DisplayUnits, area_values, known
 from logger.report.summary import counts, expected_square
 from logger.roads.iri import Area, areas
 from logger.roads.iso8608 import iri_class
@@ -102,7 +103,7 @@ def sections_of(question: SectionsQuestion) -> Sections:
     known_m, iri, std, a_w, speed_mps = (_joined([getattr(one, name) for one in figures]) for name in (
         "known_m", "iri_m_per_km", "iri_std_m_per_km", "a_w_mps2", "speed_mps"))
     return Sections(
-        "\n".join([*lines(drives, length_m, units, localized_m_per_km), *left_out_paragraph(left)]),
+        Told([*blocks(drives, length_m, units, localized_m_per_km), Lines(left_out_lines(left))]),
         as_json(drives, length_m, localized_m_per_km) | left_out_json(left), length_m,
         np.repeat(np.arange(len(drives)), [len(one.condition) for one in drives]),
         _joined([one.edges_m[:-1] for one in figures]), _joined([one.ends_m for one in drives]), known_m, iri, std, a_w,
@@ -241,22 +242,22 @@ def _of_drive(log: str, number: int, records: tuple[WindowRecord, ...], length_m
                          np.minimum(edges_m[1:], windows.end_m[-1]))
 
 
-def lines(drives: Sequence[DriveSections], length_m: float, system: str, localized_m_per_km: float | None = None
-          ) -> list[str]:
+def blocks(drives: Sequence[DriveSections], length_m: float, system: str, localized_m_per_km: float | None = None
+           ) -> Iterator[Block]:
     """For a person; with a limit the areas of localized roughness under each drive."""
     if not drives:
-        return ["No row has a distance, or lies on the route: there are no sections."]
+        yield "No row has a distance, or lies on the route: there are no sections."
+        return
     units = UNITS[system]
-    said = list(_summary(drives, length_m, units))
-    head = (f"{'from ' + units.length[0]:>10} {'to ' + units.length[0]:>10} {'known':>6} {'IRI ' + units.iri[0]:>10} "
-            f"{'std. error':>10}  {'condition':9}  {'a_w m/s2':>8} {units.speed[0]:>6}")
+    yield Lines(list(_summary(drives, length_m, units)))
+    heads = (f"from {units.length[0]}", f"to {units.length[0]}", "known", f"IRI {units.iri[0]}", "std. error",
+             "condition", "a_w m/s2", units.speed[0])
     for one in drives:
-        said += ["", _title(one), head, *_rows(one, units)]
+        yield Section(_title(one), [Table(heads, list(_rows(one, units)), (5,))])
         if localized_m_per_km is not None:
-            said += ["", *area_lines(localized(one, localized_m_per_km), localized_m_per_km, units)]
-    return [*said, "",
-            "Condition: good below 95 in/mi (1.50 m/km), poor above 170 (2.68), 23 CFR 490.313.",
-            "One sensor in the middle of the car: the IRI is that of a half car on both wheelpaths (HRI)."]
+            yield from area_blocks(localized(one, localized_m_per_km), localized_m_per_km, units)
+    yield Lines(["Condition: good below 95 in/mi (1.50 m/km), poor above 170 (2.68), 23 CFR 490.313.",
+                 "One sensor in the middle of the car: the IRI is that of a half car on both wheelpaths (HRI)."])
 
 
 def _title(one: DriveSections) -> str:
@@ -294,17 +295,16 @@ def _mean(wholes: Sequence[RoadSections]) -> tuple[float, float]:
     return float(weight @ iri), float(np.sqrt(variance))
 
 
-def _rows(one: DriveSections, units: DisplayUnits) -> Iterator[str]:
+def _rows(one: DriveSections, units: DisplayUnits) -> Iterator[tuple[str, ...]]:
     figures = one.figures
     columns = (figures.edges_m[:-1], one.ends_m, figures.known_m, figures.iri_m_per_km, figures.iri_std_m_per_km,
                figures.a_w_mps2, figures.speed_mps)
     for word, (start_m, end_m, known_m, iri, std, a_w, speed) in zip(
             one.condition, zip(*(each.tolist() for each in columns), strict=True), strict=True):
         (_, unit_m), (_, iri_scale), (_, speed_scale) = units.length, units.iri, units.speed
-        yield (f"{start_m / unit_m:10.{units.length_decimals}f} {end_m / unit_m:10.{units.length_decimals}f} "
-               f"{known_m / (end_m - start_m):6.0%} {_number(iri / iri_scale, units.iri_decimals):>10} "
-               f"{_number(std / iri_scale, units.iri_decimals + 1):>10}  {word:9}  {_number(a_w, 2):>8} "
-               f"{_number(speed / speed_scale, 0):>6}")
+        yield (f"{start_m / unit_m:.{units.length_decimals}f}", f"{end_m / unit_m:.{units.length_decimals}f}",
+               f"{known_m / (end_m - start_m):.0%}", _number(iri / iri_scale, units.iri_decimals),
+               _number(std / iri_scale, units.iri_decimals + 1), word, _number(a_w, 2), _number(speed / speed_scale, 0))
 
 
 def _number(value: float, decimals: int) -> str:

@@ -21,6 +21,7 @@ from logger.question import Answer
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
+    from logger.report.blocks import Block
     from logger.report.document import Html
     from logger.store.formats.record_checks import EvenRecord
 
@@ -60,9 +61,15 @@ class CommandResult(Answer, Shown):
 
     def as_page(self, of: str) -> Html:
         """It as a page that stands alone; ``of``: what it is a result of, such as a file."""
-        from logger.report.charts import page
+        from logger.report.blocks import Section, page
 
-        return page(self.title, of, self.text, self.charts())
+        return page(self.title, of, [*self.blocks(), Section("Pictures", self.charts())])
+
+    def blocks(self) -> Iterable[Block]:
+        """What is told."""
+        from logger.report.blocks import Lines, Told
+
+        return self.told if isinstance(self.told, Told) else [Lines([one]) for one in self.text.split("\n\n")]
 
     def write(self, path: Path, option: str = "--out") -> None:
         """Write it as the file that an ``option`` of its command asks for: of its own kind where it has one, else its

@@ -21,6 +21,7 @@ from logger.files import write_text
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.question import function
+from logger.report.blocks import Block, Lines, Table, Told
 from logger.report.quantities import numbers_of, unit_of
 from logger.runs import Past, past_of
 from logger.service.signal_chain import recorder_gain
@@ -284,7 +285,7 @@ def calibration_of(question: CalibrateQuestion) -> Calibration:
     found = calibrated(vehicle if isinstance(vehicle, Model) else vehicle_file.read_model(str(path)), path, question)
     speeds = found.speeds
     return Calibration(
-        "\n".join(lines(found)), as_json(found), found, np.array([one.speed_mps for one in speeds]),
+        Told(blocks(found)), as_json(found), found, np.array([one.speed_mps for one in speeds]),
         *(_slopes(speeds, name) for name in (
             "iri_per_accel_rms", "window_iri_per_accel_rms", "accel_rms_per_root_gd", "a_w_per_iri")))
 
@@ -372,25 +373,24 @@ def csv_lines(speeds: Sequence[SpeedCalibration]) -> Iterator[str]:
         yield ",".join(f"{value:.7g}" for value in row(speed).values()) + "\n"
 
 
-def lines(found: Calibrated) -> list[str]:
+def blocks(found: Calibrated) -> list[Block]:
     """What a person reads."""
     settings = found.settings
     limit_mps2 = next(lowest for lowest, word in COMFORT_WORDS if word == _COMFORT_WORD)
-    shown = [
-        f"{found.vehicle.name}: {settings.roads} random roads of {settings.road_m:.0f} m, IRI {LEVELS_IRI[0]:g} to "
-        f"{LEVELS_IRI[-1]:g} m/km", "",
-        f"{'':12}{f'roads of {settings.road_m:.0f} m':^33}{f'windows of {settings.window_m:.4g} m':^26}"
-        f"{'rms per':>9}{'comfort':>10}{_COMFORT_WORD[:6]:>9}",
-        f"{'m/s':>6}{'mph':>5} {'IRI per rms':>16}{'spread':>9}{'R2':>8} {'IRI per rms':>12}{'spread':>8}{'R2':>6}"
-        f"{'root Gd':>9}{'a_w/IRI':>10}{'from IRI':>9}",
-    ]
+    rows = []
     for speed in found.speeds:
         road, window = speed.iri_per_accel_rms, speed.window_iri_per_accel_rms
-        slope = f"{road.slope:.3f} ± {road.standard_error:.3f}"
-        shown.append(
-            f"{speed.speed_mps:6.2f}{speed.speed_mps / MPH_MPS:5.0f} {slope:>16}{road.spread:9.1%}{road.r2:8.4f} "
-            f"{window.slope:12.3f}{window.spread:8.1%}{window.r2:6.2f}{speed.accel_rms_per_root_gd.slope:9.5f}"
-            f"{speed.a_w_per_iri.slope:10.5f}{limit_mps2 / speed.a_w_per_iri.slope:9.1f}")
-    shown += ["", "IRI [m/km] = 'IRI per rms' x r.m.s. vertical acceleration [m/s2]; 68 of 100 lie within the spread.",
-              f"ISO 2631-1 calls the ride '{_COMFORT_WORD}' from the last column's IRI on."]
-    return shown
+        rows.append((
+            f"{speed.speed_mps:.2f}", f"{speed.speed_mps / MPH_MPS:.0f}",
+            f"{road.slope:.3f} ± {road.standard_error:.3f}", f"{road.spread:.1%}", f"{road.r2:.4f}",
+            f"{window.slope:.3f}", f"{window.spread:.1%}", f"{window.r2:.2f}",
+            f"{speed.accel_rms_per_root_gd.slope:.5f}", f"{speed.a_w_per_iri.slope:.5f}",
+            f"{limit_mps2 / speed.a_w_per_iri.slope:.1f}"))
+    return [
+        Lines([f"{found.vehicle.name}: {settings.roads} random roads of {settings.road_m:.0f} m, IRI "
+               f"{LEVELS_IRI[0]:g} to {LEVELS_IRI[-1]:g} m/km"]),
+        Table(("m/s", "mph", "IRI/rms", "spread", "R2", "IRI/rms*", "spread", "R2", "rms/root Gd", "a_w/IRI",
+               f"{_COMFORT_WORD} from"), rows, ()),
+        Lines([f"*: of windows of {settings.window_m:.4g} m, the others of whole roads.",
+               "IRI [m/km] = IRI/rms x r.m.s. vertical acceleration [m/s2]; 68 of 100 lie within the spread.",
+               f"ISO 2631-1 calls the ride '{_COMFORT_WORD}' from the last column's IRI on."])]

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import argparse
 import json
-from collections.abc import Iterator
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -350,7 +349,8 @@ def _run(folder: Path) -> Run:
 
 def _judged(folder: Path, vehicle: str, title: str, why: str, commands: _Commands, tell: Say) -> Assessment:
     """The road of a drive, read in the steps that its record says, as ``ridelog estimate`` finds it."""
-    from logger.api.drives import as_json, assessed, lines, sensor_of
+    from logger.api.drives import as_json, assessed, blocks, sensor_of
+    from logger.report.blocks import Hint, Lines, Table, text
     from logger.shipped import vehicle_path
     from logger.store.formats.vehicle_file import read_model
     from logger.units import WINDOW_M
@@ -360,15 +360,12 @@ def _judged(folder: Path, vehicle: str, title: str, why: str, commands: _Command
         say("estimating the road")
         drive = _run(folder)
         found = assessed(drive, read_model(vehicle_path(vehicle)), *sensor_of(drive), WINDOW_M)
-    tell(_essential(lines(found, as_json(str(folder), found))))
+    # Of what is printed: the mean, and the table's head, last row and remark.
+    told = list(blocks(found, as_json(str(folder), found)))
+    answer, table, remark = (next(one for one in told if isinstance(one, kind)) for kind in (Lines, Table, Hint))
+    assert isinstance(answer, Lines) and isinstance(table, Table)
+    tell([text([Lines(answer.lines[:1]), replace(table, rows=table.rows[-1:]), remark])])
     return found
-
-
-def _essential(lines: list[str]) -> Iterator[str]:
-    """Of what ``ridelog estimate`` prints: the mean, and the table's head, last row and remark."""
-    answer, table = lines[0], lines[lines.index("") + 1 :]
-    table = table[: table.index("")]
-    yield from [answer, "", table[0], *(line for line in table if line.lstrip().startswith("all ")), table[-1]]
 
 
 # --- what it came to ---
@@ -393,10 +390,11 @@ def _write_page(file: Path, out: Path, story: Story, before: Assessment, after: 
 
 
 def _ending(story: Story, before: Assessment, after: Assessment, page: Path) -> list[str]:
-    from logger.api.lab.loop import HEADS, IN_HINT, ending, rows
+    from logger.api.lab.loop import ending, iri_blocks
+    from logger.report.blocks import text
 
-    return ["", "=== The end ===", "", wrapped(ending(story)), "", *columns([HEADS, *rows(before, after)]), "",
-            wrapped([IN_HINT]), "", f"All of it as a page: {page} (open it in a browser; it needs no network)"]
+    return ["", "=== The end ===", "", text([*ending(story), *iri_blocks(before, after)]), "",
+            f"All of it as a page: {page} (open it in a browser; it needs no network)"]
 
 
 def _truth_json() -> dict[str, Any]:

@@ -20,7 +20,7 @@ import numpy as np
 
 from logger.chart_data import CLASS_COLOURS, SERIES, Array, Bars, Chart, Curves, Field, Line
 from logger.errors import BadInput
-from logger.report.document import EMPTY, Html, concatenated, document, heading, html, section
+from logger.report.document import EMPTY, Html, concatenated, html
 
 WIDTH = 1000
 _ABOUT = 6
@@ -139,7 +139,9 @@ def nice_step(least: float) -> float:
 # --- lines over an axis, shades over a grid ---
 
 
-def chart(one: Chart) -> Html:
+def chart(one: Chart | Steps) -> Html:
+    if isinstance(one, Steps):
+        return steps_figure(one)
     if isinstance(one, Bars):
         return _bars(one)
     return _figure(_CHART, one.title, _field(one) if isinstance(one, Field) else _curves(one))
@@ -315,27 +317,6 @@ def steps_figure(one: Steps) -> Html:
         parts += [_words(x, _STEPS.bottom_px + 18 + line_px * number, line, "middle")
                   for number, line in enumerate(wrap(words, letters)[:most_lines])]
     return _figure(_STEPS, one.title, [*parts, _words(_STEPS.left, _STEPS.top - 10, one.unit)], "plot named")
-
-
-_COLUMN_GAP = "  "
-
-
-def page(title: str, of: str, text: str, charts: Sequence[Chart]) -> Html:
-    """The page.
-
-    of      what it is a result of, such as a file
-    text    what the command prints
-    """
-    return document(f"{title}: {of}", [heading(title, of), *map(_part, text.split("\n\n")),
-                                       section("Pictures", concatenated(map(chart, charts)))])
-
-
-def _part(text: str) -> Html:
-    """Lines of a table stay in their columns, and are shifted sideways on a phone; sentences wrap."""
-    lines = text.strip("\n").split("\n")
-    if any(_COLUMN_GAP in line.strip() for line in lines):
-        return html('<pre class="whole">{}</pre>', "\n".join(lines))
-    return html('<p class="lines">{}</p>', "\n".join(lines))
 
 
 _LINE_COLOURS = tuple(CLASS_COLOURS[number] for number in SERIES)

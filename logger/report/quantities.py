@@ -5,7 +5,7 @@ columns of plain text, as wide as a screen.
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 from math import floor, inf, isfinite, log10
 from textwrap import fill
@@ -133,33 +133,18 @@ def wrapped(lines: Sequence[str], mark: str = "") -> str:
                           break_long_words=False, break_on_hyphens=False) for line in lines)
 
 
-def columns(rows: Sequence[Sequence[str]]) -> list[str]:
-    """Rows of words as columns, the last one as wide as it is."""
+def columns(rows: Sequence[Sequence[str]], words: Container[int] | None = None) -> list[str]:
+    """Rows of words as columns, the last one as wide as it is; those of the numbers ``words`` stand left (None: all),
+    the others right."""
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return ["  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
+    left = range(len(widths)) if words is None else words
+    return ["  ".join(f"{cell:{'<' if place in left else '>'}{width}}" for place, (cell, width) in
+                      enumerate(zip(row, widths, strict=True))).rstrip() for row in rows]
 
 
 def enumerated(names: Sequence[str], last: str) -> str:
     """Names in a row, with a word before the last: "a, b or c"."""
     return f" {last} ".join(filter(None, (", ".join(names[:-1]), names[-1])))
-
-
-def area_lines(found: Sequence[Area], limit_m_per_km: float, units: DisplayUnits = UNITS["si"]) -> Iterator[str]:
-    """A table, or a sentence where there is none."""
-    (place, place_m), (iri, scale), decimals = units.place, units.iri, units.iri_decimals
-    limit = f"{limit_m_per_km:.4g} m/km ({limit_m_per_km / INCH_PER_MILE_M_PER_KM:.0f} in/mi)"
-    if not found:
-        yield f"Areas of localized roughness: none. The IRI over a sliding base of 25 ft stays below {limit}."
-        return
-    yield f"Areas of localized roughness: where the IRI over a sliding base of 25 ft exceeds {limit}"
-    yield f"{'from ' + place:>10} {'to ' + place:>10} {'length ' + place:>9} {'worst ' + iri:>14} {'at ' + place:>10}"
-    for one in found:
-        error = known(one.worst_std_m_per_km)
-        worst = (f"{one.worst_m_per_km / scale:.{decimals}f}"
-                 + ("" if error is None else f" ± {error / scale:.{decimals}f}"))
-        start, end, length, at = (f"{value / place_m:.{units.place_decimals}f}" for value in (
-            one.start_m, one.end_m, one.end_m - one.start_m, one.worst_at_m))
-        yield f"{start:>10} {end:>10} {length:>9} {worst:>14} {at:>10}"
 
 
 def area_values(one: Area) -> dict[str, float | None]:

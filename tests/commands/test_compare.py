@@ -55,8 +55,9 @@ def test_for_a_person(runs: list[str], capsys: pytest.CaptureFixture[str]) -> No
     assert re.search(r"NRMSE 0\.\d{3} \(residual [\d.]+ over measured [\d.]+ m/s2 r\.m\.s\.\)\.", " ".join(lines))
     assert "Next: ridelog diagnose" in " ".join(reported.split())
     assert all(len(line) <= 100 for line in lines)
-    assert "wheel hop" in reported and "run1, " in reported
-    assert all(len(line) <= 80 for line in reported[reported.index("Where"):].splitlines())
+    assert "wheel hop" in reported and "\nrun1 " in reported
+    tables = reported[reported.index("By band"):reported.index("rav4-2009 on")]
+    assert all(len(line) <= 80 for line in tables.splitlines())
 
 
 @pytest.mark.slow

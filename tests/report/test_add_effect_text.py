@@ -7,10 +7,11 @@ from dataclasses import replace
 
 import numpy as np
 
-from logger.api.lab.compare import MOVED_HEADS, addition_json, bias, errors, judgement, moved_rows
+from logger.api.lab.compare import addition_json, bias, errors, judgement, moved_blocks
 from logger.lab.residuals.removed import Removed
 from logger.lab.residuals.sensor_drift import OFFSET, Drift
 from logger.lab.selection.add_effect import AddedEffects, Number
+from logger.report.blocks import Table
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
 from logger.vehicle.uncertain import NumberErrors
@@ -35,12 +36,13 @@ FOUND = AddedEffects(
 
 
 def test_the_errors_are_distinguished_from_the_file_as_it_was_to_the_noise() -> None:
-    reported = errors(FOUND)
-    assert [error for _, error, _ in reported] == [0.47, 0.43, 0.153, 0.154, 0.15]
-    assert [which for which, _, _ in reported] == ["Before", "", "After", "", "Noise floor"]
-    assert "refitted with dry_friction, on held-out stretches" in reported[2][2]
+    reported = errors(FOUND).rows
+    assert [error for _, error, _, _ in reported] == ["0.4700", "0.4300", "0.1530", "0.1540", "0.1500"]
+    assert [fit for _, _, fit, _ in reported] == ["53.0 %", "57.0 %", "84.7 %", "84.6 %", "85.0 %"]
+    assert [which for which, *_ in reported] == ["Before", "", "After", "", "Noise floor"]
+    assert "refitted with dry_friction, on held-out stretches" in reported[2][3]
     both = errors(replace(FOUND, names=("dry_friction", "sensor_gain")))
-    assert "with dry_friction and sensor_gain" in both[2][2]
+    assert "with dry_friction and sensor_gain" in both.rows[2][3]
 
 
 def test_an_effect_that_helps_is_said_to_with_its_numbers() -> None:
@@ -99,8 +101,10 @@ def test_where_nothing_was_biased_that_is_said() -> None:
 
 
 def test_the_rows_fit_their_heads_and_mark_what_was_biased() -> None:
-    rows = list(moved_rows(FOUND.moved))
-    assert all(len(row) == len(MOVED_HEADS) for row in rows)
+    table, _ = moved_blocks(FOUND.moved)
+    assert isinstance(table, Table)
+    rows = table.rows
+    assert all(len(row) == len(table.heads) for row in rows)
     assert rows[1] == ("sprung_mass_kg", "876", "-3.3%", "+0.1% ± 0.9%", "+4.0", "was biased")
     assert rows[2][-1] == ""
 

@@ -54,9 +54,10 @@ from logger.identification.unknown_road.marginal_likelihood import Options as Ro
 from logger.identification.unknown_road.road_fit import RoadFit, fit_roads
 from logger.lab.likelihood.priors import UNUSUAL_SIGMA
 from logger.lab.readings_fit import ReadingsFit, fit_to_readings
-from logger.left_out import LeftOut, left_out_json, left_out_paragraph
+from logger.left_out import LeftOut, left_out_json, left_out_lines
 from logger.profiles.track import Track
 from logger.question import function
+from logger.report.blocks import Lines, Table, Told
 from logger.report.quantities import known as known_number
 from logger.report.quantities import measured, unit_of
 from logger.runs import Run as Record
@@ -252,11 +253,12 @@ def _on_measured_roads(given: Model, records: list[Record], question: IdentifyQu
     fit = (common := with_common_roughness(model, found.fit)).fit
     low = "" if fit.low_pass.cutoff_hz is None else f", below {fit.low_pass.cutoff_hz:g} Hz"
     lines = [_in_words_of(records, one) for one in measured_lines(fit, *checks)]
-    text = [*_first_lines(fit, _head(given, len(fit.free), records, low), "rms(measured - model) / rms(measured)"),
-            *lines, *common_words(model, common), *record_words(found),
-            *left_out_paragraph(_beside_beginnings(records))]
+    told = Told([Lines([*_first_lines(fit, _head(given, len(fit.free), records, low),
+                                 "rms(measured - model) / rms(measured)")]),
+            _table(fit, fit.free), Lines([*lines, *common_words(model, common), *record_words(found)]),
+            Lines(left_out_lines(_beside_beginnings(records)))])
     return Identification(
-        "\n".join(text), measured_json(fit, *checks) | record_json(found, common, records)
+        told, measured_json(fit, *checks) | record_json(found, common, records)
         | left_out_json(runs_left_out(records)), fit, model_of(_fitted(given, model, fit)),
         tuple(_in_words_of(records, one) for one in doubts(fit, *checks)))
 
@@ -441,11 +443,12 @@ def _on_unmeasured_roads(given: Model, records: list[Record], question: Identify
     fitted = car.vehicle_with(np.array(list(fit.parameters.values())))
     model = vehicle_file.CarModel(fitted, errors=_road_fit_errors(fit),
                                   given=given.given or given.vehicle, known=given.known)
-    text = [*_first_lines(fit, _head(given, len(parameters), records, f"; over {where}", ","),
-                          "rms(residual) / rms(measured) over the most probable road"),
-            *unmeasured_lines(fit, parameters), *left_out_paragraph(_beside_beginnings(records))]
+    told = Told([Lines([*_first_lines(fit, _head(given, len(parameters), records, f"; over {where}", ","),
+                                 "rms(residual) / rms(measured) over the most probable road")]),
+            _table(fit, parameters), Lines([*unmeasured_lines(fit, parameters)]),
+            Lines(left_out_lines(_beside_beginnings(records)))])
     return Identification(
-        "\n".join(text), {**unmeasured_json(fit, parameters), "runs": [record.name for record in records],
+        told, {**unmeasured_json(fit, parameters), "runs": [record.name for record in records],
                           **left_out_json(runs_left_out(records))}, fit, model_of(model),
         tuple(finding.words for finding in fit.verdict))
 
@@ -569,10 +572,7 @@ def _first_lines(fit: Fit | RoadFit, head: str, error: str) -> Iterator[str]:
 
 
 def measured_lines(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
-    """What a person reads of a fit over roads that are known."""
-    yield ""
-    yield from _table(fit, fit.free)
-    yield ""
+    """What a person reads below the numbers of a fit over roads that are known."""
     yield from _far_from_file(fit)
     yield f"The residual is modelled as {fit.noise.words}."
     yield from _correlated(list(fit.parameters), fit)
@@ -614,24 +614,24 @@ def _ends(fit: Fit) -> str:
     return f"{same} of {len(fit.ends)} starts end at the same values; these are the best ones."
 
 
-def _table(fit: Fit | RoadFit, free: Sequence[Free]) -> Iterator[str]:
+def _table(fit: Fit | RoadFit, free: Sequence[Free]) -> Table:
     """The free numbers, then those of roads that were not measured."""
-    roads, road_errors = (fit.roads, fit.road_errors) if isinstance(fit, RoadFit) else ({}, {})
-    width = max(map(len, ["parameter", *fit.parameters, *roads]))
-    yield (f"{'parameter':{width}} {'start':>10} {'estimate':>10} {'std. error':>11} {'relative':>9}   "
-           f"{'95 % interval':^21}  moved")
+    rows = []
     for one in free:
         value, error = fit.parameters[one.name], fit.standard_errors[one.name]
         low, high = interval(fit, one)
         relative = f"{error / abs(value):.2%}" if one.by_factors else "-"
         moved = f"{value / one.start - 1:+.1%}" if one.by_factors else f"{value - one.start:+.3g}"
-        mark = "  AT ITS BOUND" if one.name in fit.at_bound else ""
-        yield (f"{one.name:{width}} {one.start:10.5g} {value:10.6g} {error:11.3g} {relative:>9}   "
-               f"{low:9.5g} to {high:9.5g}  {moved}{mark}")
+        rows.append((one.name, f"{one.start:.5g}", f"{value:.6g}", f"{error:.3g}", relative, f"{low:.5g} to {high:.5g}",
+                     moved, "AT ITS BOUND" if one.name in fit.at_bound else ""))
+    roads, errors = (fit.roads, fit.road_errors) if isinstance(fit, RoadFit) else ({}, {})
     for name, value in roads.items():
-        error = road_errors[name]
-        yield (f"{name:{width}} {'':10} {value:10.4g} {error:11.3g} {'':9}   {value - NORMAL_95 * error:9.5g} to "
-               f"{value + NORMAL_95 * error:9.5g}  {_UNITS.get(name.rpartition('.')[2], '')}")
+        error = errors[name]
+        low, high = value - NORMAL_95 * error, value + NORMAL_95 * error
+        rows.append((name, "", f"{value:.4g}", f"{error:.3g}", "", f"{low:.5g} to {high:.5g}", "",
+                     _UNITS.get(name.rpartition(".")[2], "")))
+    return Table(("parameter", "start", "estimate", "std. error", "relative", "95 % interval", "moved", ""), rows,
+                 (0, 7))
 
 
 def _correlation(fit: Fit | RoadFit) -> Array:
@@ -722,10 +722,7 @@ def unmeasured_json(fit: RoadFit, free: Sequence[Free]) -> dict[str, Any]:
 
 
 def unmeasured_lines(fit: RoadFit, free: Sequence[Free]) -> Iterator[str]:
-    """What a person reads of a fit over roads that were not measured."""
-    yield ""
-    yield from _table(fit, free)
-    yield ""
+    """What a person reads below the numbers of a fit over roads that were not measured."""
     yield from _correlated(fit.names, fit)
     for finding in fit.verdict:
         yield f"Cannot tell: {finding.words}"

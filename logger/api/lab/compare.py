@@ -30,11 +30,13 @@ from logger.lab.residuals.force_state_map import Curve, ForceMap
 from logger.lab.selection.add_effect import BIAS_SIGMA, AddedEffects, Number
 from logger.lab.selection.add_effect import Number as ShiftedNumber
 from logger.lab.selection.holdout import JUDGED_ON, fit_percent
-from logger.left_out import left_out_json, left_out_paragraph
+from logger.left_out import left_out_json, left_out_lines
+from logger.printable import counted
 from logger.question import function
 from logger.report import document as doc
+from logger.report.blocks import Block, Bullets, Detail, Hint, Linked, Section, Table, Told, page
 from logger.report.charts import chart
-from logger.report.quantities import chance, columns, finite, known, numbers_of, signal_errors, unit_of, wrapped
+from logger.report.quantities import chance, finite, known, numbers_of, signal_errors, unit_of
 from logger.runs import Run, are_on_rig, normalised_rms_error, runs_left_out, short_names
 from logger.store.formats import vehicle_file
 from logger.vehicle.effect import Chosen, Effect
@@ -79,7 +81,7 @@ class Comparison(CommandResult):
 
     def as_page(self, of: str) -> doc.Html:
         """The comparison as one HTML document."""
-        return page(self.found)
+        return page(f"{self.found.vehicle}: model and measurement", of, self.blocks())
 
 
 def compared(question: CompareQuestion) -> Comparison:
@@ -93,7 +95,7 @@ compare = function("compare", CompareQuestion, compared)
 def comparison_of(found: LabComparison) -> Comparison:
     """What the lab found, as it is shown."""
     summary = comparison_json(found)
-    return Comparison("\n".join(comparison_lines(found)), summary, found, found.plain.error, found.steps[-1].error,
+    return Comparison(Told(comparison_blocks(found)), summary, found, found.plain.error, found.steps[-1].error,
                       {one["run"]: one["error"] for one in summary["runs"]}, tuple(summary["evidence"]))
 
 
@@ -128,9 +130,9 @@ class AddedEffect(CommandResult):
 
     def figures(self) -> list[doc.Html]:
         """How the error fell."""
-        return [lab_words.falling("NRMSE, model by model", [
+        return [chart(lab_words.falling("NRMSE, model by model", [
             ("file unchanged", self.error_before), ("parameters refitted", self.error_refitted),
-            (f"with {self.effect}", self.error_after)], self.noise_floor_error)]
+            (f"with {self.effect}", self.error_after)], self.noise_floor_error))]
 
     def write(self, path: Path, option: str = "--out") -> None:
         """Write the new vehicle file."""
@@ -190,7 +192,7 @@ def asked_for(text: str, bench: Bench, question: AddEffectQuestion | LabQuestion
 def addition_of(found: AddedEffects, model: Model) -> AddedEffect:
     """What the lab found, as it is shown; the model with it."""
     return AddedEffect(
-        "\n".join(addition_lines(found)), addition_json(found), found, *_as_one(found.new),
+        Told(addition_blocks(found)), addition_json(found), found, *_as_one(found.new),
         found.error_before, found.error_refitted, found.error_after, found.noise_floor_error, found.p_value,
         found.helps, tuple(found.moved), model)
 
@@ -327,69 +329,36 @@ def _test_json(test: ResidualTestResult, found: bool) -> dict[str, Any]:
             "standard_error": known(test.standard_error), "p_value": known(test.p_value)}
 
 
-_PLACES = 5
-
-
-def comparison_lines(found: LabComparison) -> list[str]:
-    """What a person reads of a comparison."""
-    residuals = found.plain.residuals
-    seconds = sum(map(len, residuals.residual)) / residuals.rate_hz
-    return [
-        wrapped([conclusion(found), *headline(found)]), "", "After the refit:", wrapped(evidence(found), "- "), "",
-        wrapped([next_step(found)]), "",
-        *_comparison_tables(found), "",
-        f"{found.vehicle} on {len(residuals.runs)} run{'s' * (len(residuals.runs) != 1)}, {seconds:.0f} s.",
-        *left_out_paragraph(runs_left_out(residuals.runs)),
-    ]
-
-
-def _comparison_tables(found: LabComparison) -> list[str]:
-    """Where the residual is, before any fit and after the refit."""
-    lines = [f"{'Where':46}{'share of residual':>13}{'NRMSE':>12}", f"{'':44}{'filed':>8}{'refit':>7}{'filed':>8}"
-                                                                    f"{'refit':>8}"]
-    plain, refitted = found.plain.where, found.refitted.where
-    for title, unit, one, other in (
-        ("Frequency", "Hz", plain.frequency, refitted.frequency), ("Speed", "m/s", plain.speed, refitted.speed),
-    ):
-        lines += [title, *(_row(a, b, unit) for a, b in lab_words.paired(one, other))] if other else []
-    main = found.plain.residuals.runs[0].facts.main
-    lines += [f"Model's {main.measures}", *(_row(None, part, main.unit) for part in refitted.amplitude)]
-    names = short_names(found.plain.residuals.runs)
-    places = [_place(part, names[part.name]) for part in refitted.worst_places(_PLACES)]
-    return [*lines, "Worst places", *places] if places else lines
-
-
-def _row(plain: Part | None, refitted: Part, unit: str) -> str:
-    name = f"  {refitted.low:.3g} to {refitted.high:.3g} {unit}" + (f" {refitted.name}" if refitted.name else "")
-    share, error = (f"{plain.share:.1%}", lab_words.error_text(plain, 3)) if plain else ("", "")
-    return f"{name:46}{share:>6}{refitted.share:>7.1%}{error:>8}{lab_words.error_text(refitted, 3):>8}"
-
-
-def _place(part: Part, run: str) -> str:
-    name = f"  {run}, {part.low:g} to {part.high:g} m"
-    return f"{name:46}{'':6}{part.share:>7.1%}{'':8}{lab_words.error_text(part, 3):>8}"
-
-
 _BODY_HZ = 5.0
 _QUIET_DB = -80.0
 _MOST_RUNS = 8
-_WORST = 8
+_PLACES, _WORST = 5, 8
 
 
-def page(found: LabComparison) -> doc.Html:
-    """The comparison as one HTML document."""
+def judged(found: LabComparison) -> list[Block]:
+    """Whether the model lacks something, how well it does, and what speaks for that."""
+    return [conclusion(found), *headline(found), Section("After the refit", [Bullets(evidence(found))])]
+
+
+def comparison_blocks(found: LabComparison) -> Iterator[Block]:
+    """What a person reads of a comparison."""
     residuals = found.refitted.residuals
-    title = f"{found.vehicle}: model and measurement"
-    return doc.document(title, [
-        doc.heading(title, ", ".join(run.name for run in residuals.runs)), _tiles(found),
-        doc.paragraphs([conclusion(found), *headline(found)]),
-        doc.section("After the refit", doc.bullets(evidence(found)) + doc.paragraphs([next_step(found)])),
-        lab_words.removed_section(found.removed, found.band),
-        whole_drives(residuals), _worst_place(found.refitted), spectra_section(residuals),
-        _comparison_page_tables(found),
-        _places(found.refitted),
-        forces_section(found.tests.forces), _alignment(found), _tests(found), _numbers(found),
-    ])
+    seconds = sum(map(len, residuals.residual)) / residuals.rate_hz
+    yield _tiles(found)
+    yield from judged(found)
+    yield next_step(found)
+    yield lab_words.removed_section(found.removed, found.band)
+    yield _whole_drives(residuals)
+    yield _worst_place(found.refitted)
+    yield Detail("By frequency", spectra(residuals))
+    yield from _by_part(found)
+    yield _places(found.refitted)
+    yield forces_section(found.tests.forces)
+    yield _alignment(found)
+    yield _tests(found)
+    yield _numbers(found)
+    yield Hint(f"{found.vehicle} on {counted(len(residuals.runs), 'run')}, {seconds:.0f} s.")
+    yield from map(Hint, left_out_lines(runs_left_out(residuals.runs)))
 
 
 def _tiles(found: LabComparison) -> doc.Html:
@@ -411,34 +380,29 @@ def _axis(run: Run) -> str:
     return f"{run.facts.main.measures} [{run.facts.main.unit}]"
 
 
-def whole_drives(residuals: ModelResiduals) -> doc.Html:
+def _whole_drives(residuals: ModelResiduals) -> Detail:
     """What was measured and what the model leaves of it, over the whole of each run."""
     names, drawn = short_names(residuals.runs), []
     for index, run in enumerate(residuals.runs[:_MOST_RUNS]):
         time_s = (run.first + np.arange(len(residuals.residual[index]))) / residuals.rate_hz
         lines = tuple(line(word, time_s, values[index]) for word, values in (
             ("measured", residuals.measured), ("residual", residuals.residual)))
-        drawn.append(chart(Curves(names[run.name], "time [s]", _axis(run), lines)))
-    return doc.section("Each run", doc.concatenated(drawn))
+        drawn.append(Curves(names[run.name], "time [s]", _axis(run), lines))
+    return Detail("Each run", drawn)
 
 
-def _worst_place(standing: Standing) -> doc.Html:
+def _worst_place(standing: Standing) -> Detail:
     residuals, worst = standing.residuals, worst_moment(standing)
-    return doc.section("The worst place", moment_chart(worst.words, residuals, worst, {
-        "measured": residuals.measured, "residual": residuals.residual, "model": residuals.model}))
+    return Detail("The worst place", [moment_chart(worst.words, residuals, worst, {
+        "measured": residuals.measured, "residual": residuals.residual, "model": residuals.model})])
 
 
-def moment_chart(title: str, residuals: ModelResiduals, at: Moment, signals: Mapping[str, Sequence[Array]]) -> doc.Html:
+def moment_chart(title: str, residuals: ModelResiduals, at: Moment, signals: Mapping[str, Sequence[Array]]) -> Curves:
     """Signals of the runs, by name and (n,) each, at a moment."""
     run = residuals.runs[at.run]
     time_s = (run.first + np.arange(len(residuals.residual[at.run])))[at.part] / residuals.rate_hz
-    return chart(Curves(title, "time [s]", _axis(run), tuple(
-        Line(name, time_s, values[at.run][at.part]) for name, values in signals.items())))
-
-
-def spectra_section(residuals: ModelResiduals) -> doc.Html:
-    """Spectra of measurement, model and residual."""
-    return doc.section("By frequency", doc.concatenated(map(chart, spectra(residuals))))
+    return Curves(title, "time [s]", _axis(run), tuple(
+        Line(name, time_s, values[at.run][at.part]) for name, values in signals.items()))
 
 
 def decibels(residuals: ModelResiduals, signals: Sequence[Array]) -> Array:
@@ -461,9 +425,7 @@ def spectra(residuals: ModelResiduals) -> tuple[Curves, Curves]:
     return drawn("Body", 0.0, _BODY_HZ), drawn("Wheels and above", _BODY_HZ, f_hz[-1])
 
 
-def _places(standing: Standing) -> doc.Html:
-    if not standing.where.place:
-        return doc.EMPTY
+def _places(standing: Standing) -> Section:
     lines, names, unit = [], short_names(standing.residuals.runs), standing.residuals.unit
     for run in standing.residuals.runs[:_MOST_RUNS]:
         parts = [part for part in standing.where.place if part.name == run.name]
@@ -471,77 +433,71 @@ def _places(standing: Standing) -> doc.Html:
             lines.append(Line(names[run.name], np.array([(part.low + part.high) / 2 for part in parts]),
                               np.array([part.residual_mps2 for part in parts])))
     along = Curves("Residual along the road", "distance [m]", f"residual, r.m.s. [{unit}]", tuple(lines))
+    worst = standing.where.worst_places(_WORST) if standing.where.place else []
     rows = [(names[part.name], f"{part.low:g} to {part.high:g}", f"{part.share:.1%}", f"{part.residual_mps2:.3g}",
-             lab_words.error_text(part, 2)) for part in standing.where.worst_places(_WORST)]
-    return doc.section("By place", (chart(along) if lines else doc.EMPTY) + doc.grid(
-        ("Run", "From, to [m]", "Share of the residual", f"Residual [{unit}]", "NRMSE"), rows))
+             lab_words.error_text(part, 3)) for part in worst]
+    return Section("By place", [*([along] if lines else []), Table(
+        ("Run", "From, to [m]", "Share of the residual", f"Residual [{unit}]", "NRMSE"), rows, most=_PLACES)])
 
 
-def forces_section(forces: ForceMap) -> doc.Html:
+def forces_section(forces: ForceMap) -> Detail:
     """The force that is missing in the suspensions, by speed and by travel."""
-    drawn = doc.concatenated(
-        chart(Curves(title, x_name, "force [N]", (Line("missing force", curve.at * factor, curve.force_n,
-                                                         errors=curve.error_n),), (0.0, "nothing missing")))
-        for title, x_name, curve, factor in (
-            (_titled("By rate of the suspensions", forces.by_rate), "extension rate [m/s]", forces.by_rate, 1.0),
-            (_titled("By travel of the suspensions", forces.by_travel), "extension [mm]", forces.by_travel, 1000.0)))
-    return doc.section("The missing force", drawn + doc.hint(
-        "The force in each suspension, in addition to a linear spring or damper, that would explain the residual, with "
-        "its standard error. A positive force pulls body and wheel together; compression is left, extension right. "
-        "Distrust a curve that explains little of the residual."))
+    return Detail("The missing force", [
+        *(Curves(title, x_name, "force [N]", (Line("missing force", curve.at * factor, curve.force_n,
+                                                   errors=curve.error_n),), (0.0, "nothing missing"))
+          for title, x_name, curve, factor in (
+              (_titled("By rate of the suspensions", forces.by_rate), "extension rate [m/s]", forces.by_rate, 1.0),
+              (_titled("By travel of the suspensions", forces.by_travel), "extension [mm]", forces.by_travel, 1000.0))),
+        Hint("The force in each suspension, in addition to a linear spring or damper, that would explain the residual, "
+             "with its standard error. A positive force pulls body and wheel together; compression is left, extension "
+             "right. Distrust a curve that explains little of the residual.")])
 
 
-def _alignment(found: LabComparison) -> doc.Html:
+def _alignment(found: LabComparison) -> Detail:
     windows, runs = found.tests.alignment, found.plain.residuals.runs
     names = short_names(runs)
     lines = [Line(names[run.name], windows.along_m[of], windows.lag_s[of] * 1000, dots=True)
              for index, run in enumerate(runs[:_MOST_RUNS]) if (of := windows.run == index).any()]
-    if not lines or are_on_rig(runs):
-        return doc.EMPTY
-    drawn = chart(Curves("Lead of the model over the measurement", "distance into the run [m]", "lead [ms]",
-                           tuple(lines), (0.0, "no lead")))
-    return doc.section("Alignment", drawn + doc.hint(
-        "A constant lead: a clock or a position is off. A growing lead: the speed is wrong. Shown before the refit."))
+    drawn = Curves("Lead of the model over the measurement", "distance into the run [m]", "lead [ms]", tuple(lines),
+                   (0.0, "no lead"))
+    return Detail("Alignment", [*([drawn] if lines and not are_on_rig(runs) else []), Hint(
+        "A constant lead: a clock or a position is off. A growing lead: the speed is wrong. Shown before the refit.")])
 
 
 # --- tables ---
 
 
-def _comparison_page_tables(found: LabComparison) -> doc.Html:
+def _by_part(found: LabComparison) -> Iterator[Block]:
     plain, refitted = found.plain.where, found.refitted.where
-    unit = found.plain.residuals.unit
-    return (_table("By band", "Hz", plain.frequency, refitted.frequency)
-            + (_table("By speed", "m/s", plain.speed, refitted.speed) if refitted.speed else doc.EMPTY)
-            + _table("By amplitude of the motion", unit, plain.amplitude, refitted.amplitude))
+    yield _table("By band", "Hz", plain.frequency, refitted.frequency)
+    yield Hint("Share: of the residual's power. Filed: with the vehicle's file unchanged.")
+    yield _table("By speed", "m/s", plain.speed, refitted.speed)
+    yield _table("By amplitude of the motion", found.plain.residuals.unit, plain.amplitude, refitted.amplitude)
 
 
-def _table(title: str, unit: str, plain: Sequence[Part], refitted: Sequence[Part]) -> doc.Html:
+def _table(title: str, unit: str, plain: Sequence[Part], refitted: Sequence[Part]) -> Section:
     """Shares and errors of both standings; the bounds of the parts are those of the refitted one."""
-    pairs = lab_words.paired(plain, refitted)
-    named, stands = bool(refitted[0].name), any(one is not None for one, _ in pairs)
-
-    heads = (*(["Band"] if named else []), f"From, to [{unit}]", "Share of the residual", "", "NRMSE refitted",
-             *(["NRMSE, file unchanged"] if stands else []))
-    rows = [(*([part.name] if named else []), f"{part.low:.3g} to {part.high:.3g}",
-             doc.html('<div class="bar"><span class="f0" style="width:{:.1%}"></span></div>', part.share),
-             f"{part.share:.1%}", lab_words.error_text(part, 3),
-             *([lab_words.error_text(one, 3) if one else ""] if stands else [])) for one, part in pairs]
-    return doc.section(title, doc.grid(heads, rows, words=(0, 2) if named else (1,)))
+    rows = [(part.name, f"{part.low:.3g} to {part.high:.3g}",
+             Linked("", doc.html('<div class="bar"><span class="f0" style="width:{:.1%}"></span></div>', part.share)),
+             f"{part.share:.1%}", f"{one.share:.1%}" if one else "", lab_words.error_text(part, 3),
+             lab_words.error_text(one, 3) if one else "") for one, part in lab_words.paired(plain, refitted)]
+    heads = ("Band", f"From, to [{unit}]", "", "Share", "filed", "NRMSE", "filed")
+    return Section(title, [Table(heads, rows, (0, 2))])
 
 
-def _tests(found: LabComparison) -> doc.Html:
+def _tests(found: LabComparison) -> Detail:
     rows = [(test.name, _measured(test.value, test.unit), _measured(test.standard_error),
              chance(test.p_value) if np.isfinite(test.p_value) else "cannot tell",
              "found" if test in found.tests_found else "") for test in found.tests.tests]
-    return doc.section("All residual tests", doc.grid(("Test", "Value", "Standard error", "p-value", ""), rows,
-                                                                words=(0, 4))
-                       + doc.hint("Found: improbable in noise, and large enough to matter."))
+    return Detail("All residual tests", [
+        Table(("Test", "Value", "Standard error", "p-value", ""), rows, (0, 4)),
+        Hint("Found: improbable in noise, and large enough to matter.")])
 
 
-def _numbers(found: LabComparison) -> doc.Html:
+def _numbers(found: LabComparison) -> Detail:
     rows = [(name, f"{move:+.1%}", "beyond its tolerance" if name in found.far else "")
             for name, move in found.moves.items()]
-    return doc.section("Parameters moved by the refit", doc.grid(("Parameter", "Shift", ""), rows, words=(0, 2)))
+    return Detail("Parameters moved by the refit", [Table(("Parameter", "Shift", ""), rows, (0, 2))])
 
 
 def _titled(title: str, curve: Curve) -> str:
@@ -589,15 +545,16 @@ def worst_moment(standing: Standing) -> Moment:
 _NAMED = 4
 
 
-def errors(found: AddedEffects) -> list[tuple[str, float, str]]:
-    """The error before, after and of the noise: which of them, the error, and what it is of."""
-    return [
+def errors(found: AddedEffects) -> Table:
+    """The error before, after and of the noise: which of them, the error, its fit, and what it is of."""
+    return Table(("", "NRMSE", "Fit", ""), [(which, f"{error:.4f}", f"{fit_percent(error):.1f} %", what)
+                                            for which, error, what in (
         ("Before", found.error_before, "vehicle's file and distances as they are"),
         ("", found.error_refitted, f"parameters and distances refitted, on {JUDGED_ON}"),
         ("After", found.error_after, f"refitted with {' and '.join(found.names)}, on {JUDGED_ON}"),
         ("", found.error_as_written, "new file and distances as they are"),
         ("Noise floor", found.noise_floor_error, "about; the sensor's noise alone"),
-    ]
+    )], (0, 3))
 
 
 def judgement(found: AddedEffects) -> list[str]:
@@ -654,19 +611,18 @@ def _change(name: str, before: float, after: float) -> str:
     return f"{after - before:+.4g} {unit_of(name)}"
 
 
-MOVED_HEADS = ("Parameter", "Now", "Without", "With", "Shift", "")
-MOVED_HINT = ("Now: the value in the new file. Without, With: refitted without and with the effect, relative to the "
-              "given value, ± standard error. Shift: from Without to With in standard errors; beyond two, the missing "
-              "effect had biased the parameter.")
-
-
-def moved_rows(moved: Sequence[Number]) -> Iterator[tuple[str, str, str, str, str, str]]:
-    """Under ``MOVED_HEADS``."""
+def moved_blocks(moved: Sequence[Number]) -> list[Block]:
+    """A table of the car's numbers, and what its columns are; nothing where none moved."""
+    rows = []
     for one in moved:
         error = _change(one.name, one.found, one.found + one.standard_error)[1:]
-        yield (one.name, f"{one.found:.5g}", _change(one.name, one.nominal, one.without),
-               f"{_change(one.name, one.nominal, one.found)} ± {error}", f"{one.shift:+.1f}",
-               "was biased" if one.biased else "")
+        rows.append((one.name, f"{one.found:.5g}", _change(one.name, one.nominal, one.without),
+                     f"{_change(one.name, one.nominal, one.found)} ± {error}", f"{one.shift:+.1f}",
+                     "was biased" if one.biased else ""))
+    hint = Hint("Now: the value in the new file. Without, With: refitted without and with the effect, relative to the "
+                "given value, ± standard error. Shift: from Without to With in standard errors; beyond two, the "
+                "missing effect had biased the parameter.")
+    return [Table(("Parameter", "Now", "Without", "With", "Shift", ""), rows, (0, 5)), hint] if rows else []
 
 
 # --- for a program ---
@@ -706,13 +662,6 @@ def addition_json(found: AddedEffects) -> dict[str, Any]:
     }
 
 
-def addition_lines(found: AddedEffects) -> list[str]:
+def addition_blocks(found: AddedEffects) -> list[Block]:
     """What a person reads of an effect that was added."""
-    rows = [("", "NRMSE", "Fit", "")]
-    rows += [(which, f"{error:.4f}", f"{fit_percent(error):.1f} %", what)
-             for which, error, what in errors(found)]
-    return [
-        wrapped(judgement(found)), "", *columns(rows), "",
-        wrapped([bias(found.names, found.moved)]), "",
-        *columns([MOVED_HEADS, *moved_rows(found.moved)]), "", wrapped([MOVED_HINT]),
-    ]
+    return [*judgement(found), errors(found), bias(found.names, found.moved), *moved_blocks(found.moved)]

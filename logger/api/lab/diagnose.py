@@ -14,24 +14,11 @@ from typing import Any
 import numpy as np
 
 from logger.api.drives import Run
+from logger.api.lab import words as lab_words
 from logger.api.lab.bench import Bench, among, bench_with, known_effects, tolerance_of, with_candidates, word_of
 from logger.api.lab.checks import check_distances, check_record, driven_parts, thinned_runs
-from logger.api.lab.compare import forces_section, spectra_section
+from logger.api.lab.compare import forces_section, spectra
 from logger.api.lab.question import DiagnoseQuestion
-from logger.api.lab.words import (
-    band_json,
-    drift_tile,
-    error_text,
-    error_words,
-    errors_json,
-    falling,
-    not_tried,
-    removed_json,
-    removed_section,
-    removed_words,
-    steps_table,
-)
-from logger.api.lab.words import looks_like as residual_looks_like
 from logger.api.shared_fields import Runs, each
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
@@ -48,23 +35,14 @@ from logger.lab.unknown_road import diagnosis
 from logger.lab.unknown_road.diagnosis import UnknownRoadDiagnosis
 from logger.lab.unknown_road.likelihood import NotOneRoad, SameRoad
 from logger.lab.unknown_road.one_road import placed_by_road
-from logger.left_out import left_out_json, left_out_paragraph
+from logger.left_out import left_out_json, left_out_lines
 from logger.printable import percent
 from logger.profiles.track import Track
 from logger.question import Notify, function, silent
 from logger.report import document as doc
+from logger.report.blocks import Block, Bullets, Detail, Hint, Section, Table, Told, page
 from logger.report.charts import chart
-from logger.report.quantities import (
-    chance,
-    columns,
-    enumerated,
-    finite,
-    measured,
-    numbers_of,
-    signal_errors,
-    unit_of,
-    wrapped,
-)
+from logger.report.quantities import chance, enumerated, finite, measured, numbers_of, signal_errors, unit_of, wrapped
 from logger.runs import BY_RECEIVER, UNKNOWN, runs_left_out
 from logger.runs import Run as Record
 from logger.store.formats import drive_file
@@ -120,11 +98,11 @@ class Diagnosis(CommandResult):
 
     def figures(self) -> list[doc.Html]:
         """How the error fell."""
-        return [falling("NRMSE, model by model", self.steps, self.noise_floor_error)]
+        return [chart(lab_words.falling("NRMSE, model by model", self.steps, self.noise_floor_error))]
 
     def as_page(self, of: str) -> doc.Html:
         """The diagnosis as one HTML document."""
-        return page(self.found, self.vehicle)
+        return page(f"{self.vehicle}: which effect is missing?", of, self.blocks())
 
     def next_words(self, question: Any, written: Mapping[str, Sequence[Path]]) -> str:
         """What to do now; a command in one piece, so that it can be copied."""
@@ -148,11 +126,11 @@ def diagnosis_of(found: LabDiagnosis, bench: Bench, most: int | None = None, nex
                  ) -> Diagnosis:
     """What the lab found on a bench, as it is shown; ``most`` so many candidates, None: all."""
     left_out = runs_left_out(bench.runs.runs)
-    text = [*diagnosis_lines(found, most), "", wrapped([_compared(bench)]), *left_out_paragraph(left_out)]
+    told = Told([*diagnosis_blocks(found, most), *map(Hint, [_compared(bench), *left_out_lines(left_out)])])
     errors = {one.effect.name: one.standard_errors for one in found.missing}
     candidates = tuple(Candidate(one.effect.name, dict(one.values), dict(errors.get(one.effect.name, {})), one.error,
                                  one.p_value, tuple(one.confused_with)) for one in found.candidates)
-    return Diagnosis("\n".join(text), diagnosis_json(found) | left_out_json(left_out), found, found.baseline_error,
+    return Diagnosis(told, diagnosis_json(found) | left_out_json(left_out), found, found.baseline_error,
                      found.noise_floor_error, candidates, found.verdict, found.unexplained,
                      tuple((one.words, one.error) for one in found.steps), bench.model.vehicle.name, next_command)
 
@@ -232,7 +210,7 @@ def _diagnosed_same_road(question: DiagnoseQuestion) -> SameRoadDiagnosis:
     summary = same_road_json(found)
     most = None if question.list_all else _SHOWN
     return SameRoadDiagnosis(
-        "\n".join(same_road_lines(found, names, most)), summary, found, summary["baseline_error"],
+        Told(same_road_blocks(found, names, most)), summary, found, summary["baseline_error"],
         summary["noise_floor_error"], tuple(
             Candidate(one["effect"], one["parameters"], one["standard_errors"], one["error"], one["p_value"],
                       tuple(one["confused_with"])) for one in summary["candidates"]),
@@ -343,7 +321,7 @@ _SUSPECT = 0.1
 
 def diagnosis_summary(found: LabDiagnosis) -> list[str]:
     """What is missing, how certain that is, and what it could be instead: paragraphs."""
-    lines = [*removed_words(found.removed, found.band)]
+    lines = [*lab_words.removed_words(found.removed, found.band)]
     if found.contradicted:
         lines.append(f"The runs contradict the vehicle's file in {enumerated(found.contradicted, 'and')}. The search "
                      "therefore treated its parameters as unknown, except those with a stated tolerance.")
@@ -373,7 +351,7 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
               "and its unit. The search for effects corrected it."
               for name, share in found.signals_off.items()]
     lines += _car(found)
-    errors, *rises = error_words(found.steps, found.noise_floor_error)
+    errors, *rises = lab_words.error_words(found.steps, found.noise_floor_error)
     lines += [f"{errors} {_explained_power(found)}", *rises]
     lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
                            "{} with the vehicle's file unchanged, {} finally, noise floor about {}")
@@ -403,12 +381,12 @@ def _explained_power(found: LabDiagnosis) -> str:
 
 def looks_like(found: LabDiagnosis) -> list[str]:
     """What no candidate explains, described; nothing where no more than noise is left."""
-    return [] if found.shape is None else residual_looks_like(found.shape)
+    return [] if found.shape is None else lab_words.looks_like(found.shape)
 
 
 def untested(found: LabDiagnosis) -> list[str]:
     """Effects that these runs cannot show, and which drive would."""
-    lines = not_tried(found.not_tried)
+    lines = lab_words.not_tried(found.not_tried)
     lines += [f"{one.effect.name}: detectability {one.deviations:.1f} ({DETECTABLE_SIGMA:g} needed){_alike(one)}. "
               f"To see it: {one.effect.shown_by}."
               for one in found.undetectable[:_MOST_HIDDEN]]
@@ -504,10 +482,10 @@ def _on_the_way(found: LabDiagnosis) -> list[str]:
     return [step.words.removeprefix("with ") for step in found.steps if step.words.startswith("with ")]
 
 
-def table(found: LabDiagnosis, most: int | None = None) -> Iterator[tuple[str, str, str, str]]:
+def table(found: LabDiagnosis) -> Iterator[tuple[str, str, str, str]]:
     """The candidates, best first: name, error, chance, numbers."""
     by_name = {one.effect.name: one for one in found.missing}
-    for one in found.candidates[:most]:
+    for one in found.candidates:
         name = one.effect.name
         numbers = numbers_of(by_name.get(name, Chosen(one.effect, one.values)))
         yield name, f"{one.error:.3f}", chance(one.p_value), numbers
@@ -544,11 +522,11 @@ def diagnosis_json(found: LabDiagnosis) -> dict[str, Any]:
                             "best_linear": found.best_linear},
         "tolerance": found.tolerance, "coloured_noise": found.coloured,
         "steps": [{"step": step.words, "error": step.error} for step in found.steps],
-        **errors_json(found.steps, found.noise_floor_error), "no_better_than_refitted": list(found.no_better),
+        **lab_words.errors_json(found.steps, found.noise_floor_error), "no_better_than_refitted": list(found.no_better),
         "not_tried": found.not_tried,
         "undetectable": {one.effect.name: one.deviations for one in found.undetectable},
         "unexplained_shape": None if found.shape is None else _shape_json(found.shape),
-        **band_json(found.band), **removed_json(found.removed),
+        **lab_words.band_json(found.band), **lab_words.removed_json(found.removed),
         "sentences": [*diagnosis_summary(found), *looks_like(found)],
     }
 
@@ -556,7 +534,7 @@ def diagnosis_json(found: LabDiagnosis) -> dict[str, Any]:
 def _shape_json(shape: Shape) -> dict[str, Any]:
     forces, line = shape.tests.forces, shape.line
     return {
-        "sentences": residual_looks_like(shape),
+        "sentences": lab_words.looks_like(shape),
         "force_by_rate": {"rate_mps": forces.by_rate.at.tolist(), "force_n": forces.by_rate.force_n.tolist(),
                           "standard_error_n": forces.by_rate.error_n.tolist(), "share": forces.by_rate.share},
         "force_by_travel": {"travel_m": forces.by_travel.at.tolist(), "force_n": forces.by_travel.force_n.tolist(),
@@ -567,66 +545,40 @@ def _shape_json(shape: Shape) -> dict[str, Any]:
     }
 
 
-def diagnosis_lines(found: LabDiagnosis, most: int | None) -> list[str]:
-    """What a person reads of a diagnosis."""
-    shown = [wrapped(diagnosis_summary(found))]
-    if described := looks_like(found):
-        shown += ["", "What it looks like:", wrapped(described, "- ")]
-    rows = [_HEADS, *table(found, most)]
-    more = len(found.candidates) - len(rows) + 1
-    if len(rows) > 1:
-        shown += ["", "One effect at a time on the refitted model; p-values account for all of them:", *columns(rows)]
-    if more > 0:
-        shown.append(f"and {more} more (--json lists all)")
-    if found.no_better:
-        shown.append(wrapped([f"No better than the refit alone: {', '.join(found.no_better)}."]))
-    if hidden := untested(found):
-        shown += ["", "What these runs cannot tell:", wrapped(hidden, "- ")]
-    return shown
+def diagnosis_blocks(found: LabDiagnosis, most: int | None) -> Iterator[Block]:
+    """What a person reads of a diagnosis; at a terminal ``most`` so many candidates, None: all."""
+    yield _tiles(found)
+    yield from diagnosis_summary(found)
+    yield lab_words.removed_section(found.removed, found.band)
+    yield from shape_sections(found)
+    yield lab_words.steps_section([(one.words, one.error) for one in found.steps], found.noise_floor_error)
+    yield from car_sections(found)
+    yield Section(_ONE_BY_ONE, [
+        Bars("NRMSE with each effect", "NRMSE", tuple(
+            (one.effect.name, one.error) for one in found.candidates[:_MOST_BARS]),
+            (found.baseline_error, "file unchanged")),
+        Table(_HEADS, list(table(found)), (0, 3), most, " (--json lists all)"),
+        *([f"No better than the refit alone: {', '.join(found.no_better)}."] if found.no_better else [])])
+    yield Section("What these runs cannot tell", [Bullets(untested(found))])
+    yield Detail("Sources", [Bullets([f"{one.effect.name}: {one.effect.source}" for one in found.missing])])
 
 
+_ONE_BY_ONE = "One effect at a time on the refitted model; p-values account for all of them"
 _HEADS = ("Effect", "NRMSE", "p-value", "Parameters")
 _LEAST_SHARE, _MOST_BARS = 0.01, 12
 _MOTION_UNITS = {RATE: "m/s", TRAVEL: "m"}
 
 
-def page(found: LabDiagnosis, vehicle: str) -> doc.Html:
-    """The diagnosis as one HTML document."""
-    title = f"{vehicle}: which effect is missing?"
-    return doc.document(title, [
-        doc.heading(title, ", ".join(found.runs)),
-        _tiles(found), doc.paragraphs(diagnosis_summary(found)), removed_section(found.removed, found.band),
-        shape_sections(found),
-        doc.section("NRMSE, model by model", steps_table([(one.words, one.error) for one in found.steps],
-                                                         found.noise_floor_error)), car_sections(found),
-        doc.section("All candidates", _candidates(found)),
-        doc.section("What these runs cannot tell", doc.bullets(untested(found))),
-        doc.section("Sources", doc.bullets(sources(found))),
-    ])
-
-
-def sources(found: LabDiagnosis) -> list[str]:
-    """What to cite for the effects that are missing."""
-    return [f"{one.effect.name}: {one.effect.source}" for one in found.missing]
-
-
-def shape_sections(found: LabDiagnosis) -> doc.Html:
+def shape_sections(found: LabDiagnosis) -> list[Section]:
     """What no candidate explains: sentences and pictures; nothing where nothing is unexplained."""
     if found.shape is None:
-        return doc.EMPTY
-    return (doc.section("What no effect explains", doc.bullets(looks_like(found)))
-            + doc.section("By frequency and distance", _where(found.shape)) + spectra_section(found.shape.residuals)
-            + _forces(found.shape))
-
-
-def _forces(shape: Shape) -> doc.Html:
-    """The missing force; a sentence where no force in the suspensions would do."""
-    forces = shape.tests.forces
-    if max(forces.by_rate.share, forces.by_travel.share) < _LEAST_SHARE:
-        return doc.section("The missing force", doc.paragraphs([
-            "No force in the suspensions that depends on their rate or travel would explain it: it comes from "
-            "elsewhere."]))
-    return forces_section(forces)
+        return []
+    forces = found.shape.tests.forces
+    elsewhere = Detail("The missing force", [
+        "No force in the suspensions that depends on their rate or travel would explain it: it comes from elsewhere."])
+    return [Section("What no effect explains", [Bullets(looks_like(found))]), _where(found.shape),
+            Detail("By frequency", spectra(found.shape.residuals)),
+            elsewhere if max(forces.by_rate.share, forces.by_travel.share) < _LEAST_SHARE else forces_section(forces)]
 
 
 def _tiles(found: LabDiagnosis) -> doc.Html:
@@ -637,53 +589,43 @@ def _tiles(found: LabDiagnosis) -> doc.Html:
         ("Missing", unknown if found.exceeds_noise or (found.unexplained and not missing) else count, ""),
         ("NRMSE, file unchanged", f"{found.baseline_error:.3f}", ""),
         ("NRMSE with the missing effects" if missing else "NRMSE refitted", f"{found.final_error:.3f}", "refitted"),
-        *drift_tile(found.removed),
+        *lab_words.drift_tile(found.removed),
         ("Noise floor", f"{found.noise_floor_error:.3f}", "NRMSE"),
     ])
 
 
-def _candidates(found: LabDiagnosis) -> doc.Html:
-    bars = Bars("NRMSE with each effect", "NRMSE", tuple(
-        (one.effect.name, one.error) for one in found.candidates[:_MOST_BARS]),
-        (found.baseline_error, "file unchanged"))
-    return (chart(bars) + doc.grid(_HEADS, table(found), words=(0, 3))
-            + doc.hint("One effect at a time on the refitted model: first those that are missing, then by p-value, the "
-                       f"probability that noise alone looks like any of them. NRMSE on {JUDGED_ON}."))
-
-
-def car_sections(found: LabDiagnosis) -> doc.Html:
+def car_sections(found: LabDiagnosis) -> list[Section]:
     """How far the car's numbers moved, as bars, and the forces of its springs and dampers as fitted, as curves."""
     if found.car is None:
-        return doc.EMPTY
+        return []
     bars = Bars("Shift of each parameter by the refit", "% of the file's value", tuple(
         (name, 100 * share) for name, (share, _) in found.car.moved.items()))
     rows = [(name, f"{share:+.1%}", f"± {tolerance:.1%}", "beyond it" if name in found.beyond else "")
             for name, (share, tolerance) in found.car.moved.items()]
-    numbers = chart(bars) + doc.grid(("Parameter", "Shift", "Tolerance", ""), rows, words=(0, 3)) + doc.hint(
-        "A parameter that moves far may stand in for an effect that ridelog does not know.")
-    curves = doc.concatenated(map(_force, found.car.curves))
-    said = doc.hint("Over the range that the model's suspensions reach in 99.9 % of these runs, without forces that "
-                    "have a memory.") if curves else doc.EMPTY
-    return (doc.section("The car's parameters", numbers if rows else doc.EMPTY)
-            + doc.section("Springs and dampers", curves + said))
+    return [
+        Detail("The car's parameters", [bars, Table(("Parameter", "Shift", "Tolerance", ""), rows, (0, 3)), Hint(
+            "A parameter that moves far may stand in for an effect that ridelog does not know.")] if rows else []),
+        Detail("Springs and dampers", [*map(_force, found.car.curves), Hint(
+            "Over the range that the model's suspensions reach in 99.9 % of these runs, without forces that have a "
+            "memory.")])]
 
 
-def _force(one: ForceCurve) -> doc.Html:
-    return chart(Curves(
+def _force(one: ForceCurve) -> Curves:
+    return Curves(
         f"{one.axle.capitalize()} suspension: force by {one.motion}",
         f"{one.motion} [{_MOTION_UNITS[one.motion]}], positive in extension", "force [N]",
-        (Line("refitted", one.at, one.after_n), Line("file unchanged", one.at, one.before_n))))
+        (Line("refitted", one.at, one.after_n), Line("file unchanged", one.at, one.before_n)))
 
 
-def _where(shape: Shape) -> doc.Html:
+def _where(shape: Shape) -> Detail:
     """By frequency, and along the way."""
-    rows = [(part.name, f"{part.low:.3g} to {part.high:.3g}", f"{part.share:.1%}", error_text(part, 2))
+    rows = [(part.name, f"{part.low:.3g} to {part.high:.3g}", f"{part.share:.1%}", lab_words.error_text(part, 2))
             for part in shape.where.frequency]
-    drawn = doc.grid(("Band", "From, to [Hz]", "Share of the residual", "NRMSE"), rows)
+    drawn: list[Block] = [Table(("Band", "From, to [Hz]", "Share of the residual", "NRMSE"), rows)]
     if shape.line is not None and shape.line.found:
-        drawn += chart(Curves(f"What repeats along the road, in {shape.line.run}", "spatial frequency [1/m]",
-                                "power over its mean [1]", (Line("residual", shape.line.per_m, shape.line.power),)))
-    return drawn
+        drawn.append(Curves(f"What repeats along the road, in {shape.line.run}", "spatial frequency [1/m]",
+                            "power over its mean [1]", (Line("residual", shape.line.per_m, shape.line.power),)))
+    return Detail("By frequency and distance", drawn)
 
 
 def same_road_summary(found: UnknownRoadDiagnosis) -> list[str]:
@@ -731,24 +673,22 @@ def cannot_tell(found: UnknownRoadDiagnosis) -> list[str]:
     if found.absorbed_by_road:
         lines.append(f"{', '.join(found.absorbed_by_road)}: not tried; on a road that nobody measured, another road "
                      "would look the same.")
-    lines += not_tried(found.untried)
+    lines += lab_words.not_tried(found.untried)
     lines += [f"{name}: detectability {deviations:.1f} ({DETECTABLE_SIGMA:g} needed)."
               for name, deviations in found.hidden.items()]
     return [*lines, *(f"The model's parameters: {one.words}" for one in found.confounded)]
 
 
-def same_road_lines(found: UnknownRoadDiagnosis, runs: Sequence[str], most: int | None) -> list[str]:
-    """What a person reads; ``most`` so many candidates, None: all."""
-    rows = [_HEADS]
-    rows += [(one.name, f"{one.error:.3f}{'' if one.fitted else ', not fitted'}", chance(one.p_value),
-              numbers_of(one.one)) for one in found.candidates[:most]]
-    by_run = [("Run", "NRMSE before", "after"),
-              *((name, f"{before:.3f}", f"{after:.3f}") for name, (before, after) in
-                zip(runs, found.by_run, strict=True))]
-    return [wrapped(same_road_summary(found)), "",
-            "One effect at a time on the refitted model; p-values account for all of them:",
-            *columns(rows), "", *columns(by_run), "",
-            "What these drives cannot tell:", wrapped(cannot_tell(found), "- ")]
+def same_road_blocks(found: UnknownRoadDiagnosis, runs: Sequence[str], most: int | None) -> Iterator[Block]:
+    """What a person reads; at a terminal ``most`` so many candidates, None: all."""
+    yield from same_road_summary(found)
+    yield lab_words.steps_section(_same_road_steps(found), found.floor_error)
+    yield Section(_ONE_BY_ONE, [Table(_HEADS, [
+        (one.name, f"{one.error:.3f}{'' if one.fitted else ', not fitted'}", chance(one.p_value), numbers_of(one.one))
+        for one in found.candidates], (0, 3), most, " (--json lists all)")])
+    yield Table(("Run", "NRMSE before", "after"), [
+        (name, f"{before:.3f}", f"{after:.3f}") for name, (before, after) in zip(runs, found.by_run, strict=True)])
+    yield Section("What these drives cannot tell", [Bullets(cannot_tell(found))])
 
 
 def same_road_json(found: UnknownRoadDiagnosis) -> dict[str, Any]:

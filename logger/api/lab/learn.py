@@ -5,20 +5,19 @@ The page has what the law is, its picture, what it brings, and what it may be in
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from logger.api.lab.bench import Bench, bench_with
-from logger.api.lab.diagnose import looks_like, shape_sections
+from logger.api.lab.diagnose import shape_sections
 from logger.api.lab.question import LearnQuestion
 from logger.api.lab.words import error_words, errors_json, falling, removed_json, removed_words
 from logger.api.shown import CommandResult
 from logger.chart_data import Chart, Curves
 from logger.files import write_text
-from logger.lab.diagnosis import LabDiagnosis
 from logger.lab.laws.draft import Draft
 from logger.lab.laws.learn import Law, Learning
 from logger.lab.laws.learn import learn as learn_law
@@ -28,9 +27,10 @@ from logger.lab.selection.add_effect import AddedEffects, add
 from logger.lab.selection.holdout import JUDGED_ON, ErrorStep
 from logger.plugins import catalogue
 from logger.question import Notify, function, silent
+from logger.report.blocks import Block, Bullets, Detail, Hint, Section, Table, Told, page
 from logger.report.charts import chart
-from logger.report.document import EMPTY, Html, document, grid, heading, hint, paragraphs, section, tiles
-from logger.report.quantities import finite, measured, numbers_of, unit_of, wrapped
+from logger.report.document import Html, tiles
+from logger.report.quantities import finite, measured, numbers_of, unit_of
 from logger.store.formats import effect_file
 from logger.vehicle.effect import Chosen
 from logger.vehicle.uncertain import sized
@@ -80,8 +80,7 @@ class LearnedLaw(CommandResult):
 
     def figures(self) -> list[Html]:
         """How the error fell, and the law."""
-        return [falling("NRMSE, model by model", self.steps, self.noise_floor_error),
-                *super().figures()]
+        return [chart(falling("NRMSE, model by model", self.steps, self.noise_floor_error)), *super().figures()]
 
     def write(self, path: Path | str, option: str = "--out") -> None:
         """Write the law's file (.py), or the page (.html). Without a law there is no file: ``source`` is empty."""
@@ -93,8 +92,8 @@ class LearnedLaw(CommandResult):
 
     def as_page(self, of: str) -> Html:
         """What was learned as one HTML document."""
-        return page(self.found.learning, self.found.addition, self.curves[0] if self.curves else None, self.vehicle,
-                    str(self._json["law"] or "law.py"))
+        runs = ", ".join(run.name for run in self.found.learning.context.runs)
+        return page(f"{self.vehicle}: a law learned from runs", runs, self.blocks())
 
     def next_words(self, question: Any, written: Mapping[str, Sequence[Path]]) -> str:
         """How to add the law."""
@@ -113,7 +112,7 @@ def law_of(question: LearnQuestion) -> LearnedLaw:
     drawn = picture_of(found)
     steps = tuple((one["step"], one["error"]) for one in summary["steps"])
     return LearnedLaw(
-        "\n".join(law_lines(found.learning, found.addition)), summary, found, bench.model.vehicle.name,
+        Told(law_blocks(found)), summary, found, bench.model.vehicle.name,
         summary["family"], summary["words"], source_of(found.learning, found.addition), summary["parameters"],
         summary["standard_errors"], summary["error_before"], summary["error_after"], summary["error_after_unseen"],
         summary["noise_floor_error"], tuple(summary["verdict"]), () if drawn is None else (drawn,), steps)
@@ -197,18 +196,26 @@ def _refused(one: Refusal) -> str:
     return f"no law learned: {one.title} would explain the residual best, but {one.why}{add}"
 
 
-def law_lines(found: Learning, addition: AddedEffects | None) -> list[str]:
+def law_blocks(learned: LearnedModel) -> Iterator[Block]:
     """What a person reads."""
+    found, addition = learned.learning, learned.addition
+    yield _tiles(as_json(found, addition, None))
     if found.law is None or addition is None:
         assert found.diagnosis is not None
         said = why_none(found)
-        removed = removed_words(found.diagnosis.removed, found.diagnosis.band)
-        lines = [wrapped([*removed, f"{said[0].upper()}{said[1:]}."])]
-        lines += [f"  {one.effect.name}: {numbers_of(one)}" for one in found.diagnosis.missing if one.values]
-        if shape := looks_like(found.diagnosis):
-            lines += ["", wrapped(shape, "- ")]
-        return [*lines, "", wrapped([_without(found.diagnosis)])]
-    return [wrapped(sentences(found.law, addition))]
+        yield from removed_words(found.diagnosis.removed, found.diagnosis.band)
+        yield f"{said[0].upper()}{said[1:]}."
+        yield Bullets([f"{one.effect.name}: {numbers_of(one)}" for one in found.diagnosis.missing if one.values])
+        yield from shape_sections(found.diagnosis)
+        yield " ".join(error_words(found.diagnosis.steps, found.diagnosis.noise_floor_error))
+        return
+    yield from sentences(found.law, addition)
+    yield from law_sections(found.law, addition, picture_of(learned))
+    yield Detail("NRMSE, model by model", [
+        falling(f"NRMSE on {JUDGED_ON}", steps_of(found.law, addition), addition.noise_floor_error)])
+    yield Detail("The law's file", [
+        "It is an effect of your own: compare, simulate, add-effect and diagnose --effect-file read it.",
+        found.law.draft.source])
 
 
 def sentences(law: Law, addition: AddedEffects) -> list[str]:
@@ -248,10 +255,6 @@ def _nearest(nearest: Nearest | None, law: Law) -> list[str]:
 def _errors(addition: AddedEffects) -> str:
     steps = (*addition.steps[:-1], ErrorStep("with the law", addition.error_after))
     return " ".join(error_words(steps, addition.noise_floor_error))
-
-
-def _without(diagnosis: LabDiagnosis) -> str:
-    return " ".join(error_words(diagnosis.steps, diagnosis.noise_floor_error))
 
 
 def source_of(found: Learning, addition: AddedEffects | None) -> str:
@@ -323,35 +326,14 @@ def steps_of(law: Law, addition: AddedEffects) -> list[tuple[str, float]]:
 _BAND = "Band: one standard error either way. The curve covers the motions of the runs."
 
 
-def page(found: Learning, addition: AddedEffects | None, drawn: Chart | None, vehicle: str, file: str) -> Html:
-    """What was learned as one HTML document; ``file``: of the law."""
-    title = f"{vehicle}: a law learned from runs"
-    runs = ", ".join(run.name for run in found.context.runs)
-    summary = as_json(found, addition, file)
-    law = found.law
-    if law is None or addition is None:
-        assert found.diagnosis is not None
-        return document(title, [
-            heading(title, runs), _tiles(summary), paragraphs(law_lines(found, addition)),
-            shape_sections(found.diagnosis)])
-    return document(title, [
-        heading(title, runs), _tiles(summary), paragraphs(sentences(law, addition)),
-        *law_sections(law, addition, drawn),
-        section("NRMSE, model by model", falling(f"NRMSE on {JUDGED_ON}", steps_of(law, addition),
-                                                 addition.noise_floor_error)),
-        section("The law's file", paragraphs([f"{file} is an effect of your own: compare, simulate, add-effect and "
-                                              "diagnose --effect-file read it.", law.draft.source]))])
-
-
-def law_sections(law: Law, addition: AddedEffects, drawn: Chart | None) -> list[Html]:
+def law_sections(law: Law, addition: AddedEffects, drawn: Chart | None) -> list[Section]:
     """A law's picture, if it has one, and its numbers."""
     one = law_learned(law, addition)
     numbers = [(name, measured(value, one.standard_errors.get(name)), unit_of(name), parameter.meaning)
                for (name, value), parameter in zip(one.values.items(), law.draft.parameters, strict=True)]
-    table = section("Its parameters", grid(("Parameter", "Value", "Unit", "What it is"), numbers, words=(0, 2, 3)))
-    if drawn is None:
-        return [table]
-    return [section("The law", chart(drawn) + (hint(_BAND) if law.draft.at != "loop" else EMPTY)), table]
+    hint = [Hint(_BAND)] if law.draft.at != "loop" else []
+    return [Detail("The law", [*([drawn] if drawn else []), *hint]),
+            Detail("Its parameters", [Table(("Parameter", "Value", "Unit", "What it is"), numbers, (0, 2, 3))])]
 
 
 def _tiles(summary: dict[str, object]) -> Html:

@@ -5,7 +5,7 @@ The steps, the story of them in words and for a program, and its page; beside it
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -14,18 +14,11 @@ from typing import Any
 import numpy as np
 
 from logger.api.lab import compare as comparing
+from logger.api.lab import diagnose as diagnosing
+from logger.api.lab import learn as learning
 from logger.api.lab.bench import Bench, bench_with, with_candidates
-from logger.api.lab.diagnose import (
-    Diagnosis,
-    diagnosis_lines,
-    diagnosis_of,
-    diagnosis_summary,
-    shape_sections,
-    untested,
-)
-from logger.api.lab.learn import law_lines, law_sections, learned, picture_of, sentences, source_of, why_none, with_law
 from logger.api.lab.question import LabLoopQuestion
-from logger.api.lab.words import falling, steps_table
+from logger.api.lab.words import falling, steps_section
 from logger.api.shown import CommandResult, check_out
 from logger.api.vehicles import Model, model_of, read_vehicle
 from logger.chart_data import Array, Curves, Line
@@ -40,9 +33,10 @@ from logger.lab.selection.holdout import JUDGED_ON
 from logger.lab.session import LawSearch, Round, Story
 from logger.question import Notify, function
 from logger.report import document as doc
+from logger.report.blocks import Block, Bullets, Hint, Section, Table, Told, page, text
 from logger.report.charts import chart
 from logger.report.maps import MapLine, ways_map
-from logger.report.quantities import columns, wrapped
+from logger.report.quantities import wrapped
 from logger.store.formats import vehicle_file as vehicle_format
 from logger.vehicle.effect import Chosen
 
@@ -82,7 +76,7 @@ class LabStory(CommandResult):
     story: Story
     model: Model
     first: comparing.Comparison
-    diagnoses: tuple[Diagnosis, ...]
+    diagnoses: tuple[diagnosing.Diagnosis, ...]
     additions: tuple[comparing.AddedEffect, ...]
     comparisons: tuple[comparing.Comparison, ...]
     refused: tuple[str, ...]
@@ -95,7 +89,7 @@ class LabStory(CommandResult):
 
     def figures(self) -> list[doc.Html]:
         """How the error fell."""
-        return [falling("NRMSE, model by model", self.steps, self.noise_floor_error)]
+        return [chart(falling("NRMSE, model by model", self.steps, self.noise_floor_error))]
 
 
 def story_of(question: LabLoopQuestion) -> LabStory:
@@ -160,12 +154,12 @@ def walk(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progress, exp
     write_text(out / STORY, story_page(story))
     notify(chapter("The end", explain("end", "", "")))
     notify([wrapped(ending(story)), "", f"The whole story as a page: {out / STORY}"])
-    rows = [(words, f"{error:.3f}") for words, error in steps(story)]
+    models = Table(("Model", "Error"), [(words, f"{error:.3f}") for words, error in steps(story)])
     summary = as_json(story) | {"story": str(out / STORY)}
     return LabStory(
-        "\n".join([*columns([("Model", "Error"), *rows]), "", wrapped(ending(story))]), summary, story,
+        Told([models, *ending(story)]), summary, story,
         model_of(model), comparing.comparison_of(story.first),
-        tuple(diagnosis_of(one, given) for one in story.diagnoses),
+        tuple(diagnosing.diagnosis_of(one, given) for one in story.diagnoses),
         tuple(comparing.addition_of(one.addition, read_vehicle(one.file)) for one in story.rounds),
         tuple(comparing.comparison_of(one.comparison) for one in story.rounds), story.refused,
         Path(story.law.file) if story.law and story.law.file else None, summary["error_before"], summary["error_after"],
@@ -178,7 +172,7 @@ def go_through(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progres
     word = given.word
     notify(chapter("Compare", explain("compare", "", word)))
     first = _compared(given, progress)
-    notify(_comparison_lines(first))
+    notify([text(comparing.judged(first))])
     diagnoses: list[diagnosis.LabDiagnosis] = []
     rounds: list[Round] = []
     refused: list[str] = []
@@ -189,7 +183,7 @@ def go_through(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progres
         going = False
         notify(chapter("Diagnose", explain("diagnose", "", word)))
         diagnoses.append(_diagnosed(step.given, frozenset(refused), progress))
-        notify(diagnosis_lines(diagnoses[-1], _SHOWN))
+        notify([text(diagnosing.diagnosis_blocks(diagnoses[-1], _SHOWN))])
         if diagnoses[-1].exceeds_noise and asked:
             asked = False
             if learns():
@@ -240,28 +234,28 @@ class _Step:
         file = self.out / LAW
         self.notify(chapter("Learn a law", self.explain("learn", "", str(file))))
         with self.progress() as notify:
-            found = learned(self.given, notify)
-        self.notify(law_lines(found.learning, found.addition))
+            found = learning.learned(self.given, notify)
+        self.notify([text(learning.law_blocks(found))])
         if found.addition is None:
             return self, LawSearch(found.learning, None, None, ""), []
-        write_text(file, source_of(found.learning, found.addition))
+        write_text(file, learning.source_of(found.learning, found.addition))
         self.notify(["", f"Law: {file}"])
-        knows, addition = with_law(self.given, found.addition, file)
+        knows, addition = learning.with_law(self.given, found.addition, file)
         name = " and ".join(addition.names)
         vehicle = _vehicle_file(self.out, 1)
         self.notify(chapter(f"Add {name}", self.explain("add", name, str(vehicle))))
         step, made = replace(self, given=knows)._with(addition, name, vehicle)
-        return step, LawSearch(found.learning, found.addition, picture_of(found), str(file)), [made]
+        return step, LawSearch(found.learning, found.addition, learning.picture_of(found), str(file)), [made]
 
     def _with(self, addition: AddedEffects, name: str, file: Path) -> tuple[_Step, Round]:
         """The vehicle with what was added written and compared."""
         model = self.given.model_with(addition)
         vehicle_format.write_model(file, model)
-        self.notify([*comparing.addition_lines(addition), "", f"Vehicle: {file}"])
+        self.notify([text(comparing.addition_blocks(addition)), "", f"Vehicle: {file}"])
         self.notify(chapter("Compare again", self.explain("again", name, str(file))))
         given = replace(self.given, model=model)
         made = Round(addition, _compared(given, self.progress), str(file))
-        self.notify(_comparison_lines(made.comparison))
+        self.notify([text(comparing.judged(made.comparison))])
         return replace(self, given=given), made
 
 
@@ -288,11 +282,6 @@ def _compared(given: Bench, progress: Progress) -> compare.LabComparison:
 def chapter(title: str, explained: str = "") -> list[str]:
     """The lines of a heading, with what stands under it."""
     return ["", f"=== {title} ===", *([explained] if explained else []), ""]
-
-
-def _comparison_lines(found: compare.LabComparison) -> list[str]:
-    return [wrapped([comparing.conclusion(found), *comparing.headline(found)]), "", "After the refit:",
-            wrapped(comparing.evidence(found), "- ")]
 
 
 def steps(story: Story) -> list[tuple[str, float]]:
@@ -355,73 +344,60 @@ _HIGHEST_OF_RATE = 0.4
 
 def story_page(story: Story) -> doc.Html:
     """The story as one HTML document."""
-    title = f"{story.first.vehicle}: what the model lacked"
     runs = story.first.plain.residuals.runs
+    return page(f"{story.first.vehicle}: what the model lacked", ", ".join(run.name for run in runs),
+                _story_blocks(story))
+
+
+def _story_blocks(story: Story) -> Iterator[Block]:
     last = story.diagnoses[-1]
     at_last = [last] if len(story.diagnoses) > 1 and not last.missing else []
     before = story.diagnoses[:len(story.diagnoses) - len(at_last)]
-    return doc.document(title, [
-        doc.heading(title, ", ".join(run.name for run in runs)),
-        _story_tiles(story), doc.paragraphs(ending(story)), doc.section("NRMSE, model by model", _steps(story)),
-        doc.section("Initially", doc.paragraphs([comparing.conclusion(story.first), *comparing.headline(story.first)])
-                    + doc.bullets(comparing.evidence(story.first))),
-        doc.section("What was missing", doc.concatenated(doc.paragraphs(diagnosis_summary(one)) for one in before)),
-        *_law(story), *map(_added, story.rounds),
-        doc.section("Before and after", residual_spectra(story) + _place(story)) if story.rounds else "",
-        doc.section("What the missing effects had biased", _moved(story)),
-        doc.section("Finally", doc.paragraphs([comparing.conclusion(story.last), *comparing.headline(story.last)])
-                    + doc.bullets(comparing.evidence(story.last))
-                    + doc.concatenated(doc.paragraphs(diagnosis_summary(one)) for one in at_last)
-                    ) if story.rounds else "",
-        shape_sections(last),
-        doc.section("What these runs cannot tell, and which drive would", doc.bullets(untested(last))),
-        doc.section("Sources", doc.bullets(
-            f"{one.effect.name} ({one.effect.title}): {one.effect.source}" for one in story.last.effects)),
-    ])
-
-
-def _story_tiles(story: Story) -> doc.Html:
-    return doc.tiles([
+    yield doc.tiles([
         ("NRMSE, file unchanged", f"{steps(story)[0][1]:.3f}", ""),
         ("NRMSE finally", f"{steps(story)[-1][1]:.3f}", "refitted"),
         ("Noise floor", f"{story.floor:.3f}", "NRMSE"),
         ("Effects added", f"{len(story.added)}", ""),
     ])
+    yield from ending(story)
+    yield steps_section(steps(story), story.floor, Hint(STEPS_HINT))
+    yield Section("Initially", _judged(story.first))
+    yield Section("What was missing", [words for one in before for words in diagnosing.diagnosis_summary(one)])
+    yield from _law(story)
+    for one in story.rounds:
+        yield Section(f"Added: {' and '.join(one.addition.names)}", [
+            *comparing.judgement(one.addition), *(f"Signature: {new.effect.signature}." for new in one.addition.new),
+            f"Written to {one.file}.", comparing.errors(one.addition)])
+    if story.rounds:
+        yield Section("Before and after", [residual_spectra(story), _place(story)])
+    yield Section("What the missing effects had biased", comparing.moved_blocks(story.moved))
+    if story.rounds:
+        yield Section("Finally", [*_judged(story.last), *(
+            words for one in at_last for words in diagnosing.diagnosis_summary(one))])
+    yield from diagnosing.shape_sections(last)
+    yield Section("What these runs cannot tell, and which drive would", [Bullets(diagnosing.untested(last))])
+    yield Section("Sources", [Bullets([
+        f"{one.effect.name} ({one.effect.title}): {one.effect.source}" for one in story.last.effects])])
 
 
-def _steps(story: Story) -> doc.Html:
-    return steps_table(steps(story), story.floor) + doc.hint(STEPS_HINT)
+def _judged(found: compare.LabComparison) -> list[Block]:
+    return [comparing.conclusion(found), *comparing.headline(found), Bullets(comparing.evidence(found))]
 
 
-def _law(story: Story) -> list[doc.Html]:
+def _law(story: Story) -> list[Section]:
     """The law that was looked for; nothing where none was."""
     sought = story.law
     if sought is None:
         return []
     if sought.learning.law is None or sought.addition is None:
-        said = why_none(sought.learning)
-        return [doc.section("A law learned from the runs", doc.paragraphs([f"{said[0].upper()}{said[1:]}."]))]
-    return [doc.section("A law learned from the runs", doc.paragraphs(
-        [*sentences(sought.learning.law, sought.addition), f"Written to {sought.file}."])),
-        *law_sections(sought.learning.law, sought.addition, sought.picture)]
+        said = learning.why_none(sought.learning)
+        return [Section("A law learned from the runs", [f"{said[0].upper()}{said[1:]}."])]
+    return [Section("A law learned from the runs", [
+        *learning.sentences(sought.learning.law, sought.addition), f"Written to {sought.file}."]),
+        *learning.law_sections(sought.learning.law, sought.addition, sought.picture)]
 
 
-def _added(one: Round) -> doc.Html:
-    effects = [f"Signature: {new.effect.signature}." for new in one.addition.new]
-    rows = [(which, f"{error:.4f}", what) for which, error, what in comparing.errors(one.addition)]
-    said = doc.paragraphs([*comparing.judgement(one.addition), *effects, f"Written to {one.file}."])
-    return doc.section(f"Added: {' and '.join(one.addition.names)}",
-                       said + doc.grid(("", "NRMSE", ""), rows, words=(0, 2)))
-
-
-def _moved(story: Story) -> doc.Html:
-    if not story.moved:
-        return doc.EMPTY
-    return doc.grid(comparing.MOVED_HEADS, comparing.moved_rows(story.moved), words=(0, 5)) + doc.hint(
-        comparing.MOVED_HINT)
-
-
-def residual_spectra(story: Story) -> doc.Html:
+def residual_spectra(story: Story) -> Curves:
     """The residual before and after, by frequency."""
     before, after = story.first.refitted.residuals, story.last.refitted.residuals
     f_hz = frequencies(before)
@@ -434,10 +410,10 @@ def residual_spectra(story: Story) -> doc.Html:
     lines = (line("measured", before, True), line("residual initially", before, False),
              line("residual finally", after, False))
     unit = before.unit
-    return chart(Curves("By frequency", "frequency [Hz]", f"power spectral density [dB re 1 ({unit})2/Hz]", lines))
+    return Curves("By frequency", "frequency [Hz]", f"power spectral density [dB re 1 ({unit})2/Hz]", lines)
 
 
-def _place(story: Story) -> doc.Html:
+def _place(story: Story) -> Curves:
     """The place that was worst at first, then and now."""
     before, after = story.first.refitted, story.last.refitted
     worst, residuals = comparing.worst_moment(before), before.residuals
@@ -446,8 +422,6 @@ def _place(story: Story) -> doc.Html:
         "residual finally": after.residuals.residual})
 
 
-HEADS = ("IRI", "Mean [m/km]", "Bias", "R2", "Within 1", "Within 2")
-IN_HINT = "Within 1, 2: share of windows with the truth within one, two standard errors (ideal: 68 %, 95 %)."
 
 
 def figures_of(found: Assessment) -> dict[str, Any]:
@@ -455,12 +429,14 @@ def figures_of(found: Assessment) -> dict[str, Any]:
     return figures(found, found.windows.speed_mps > 0)
 
 
-def rows(before: Assessment, after: Assessment) -> list[tuple[str, ...]]:
-    """The table of ``HEADS``: by the file as it was given, by the last one, and the truth."""
-    estimated = [_row("estimated with the first file", figures_of(before)),
-                 _row("estimated with the last file", figures_of(after))]
+def iri_blocks(before: Assessment, after: Assessment) -> list[Block]:
+    """A table of the IRI by the file as it was given, by the last one, and the truth; and what its columns are."""
     known = after.exact_m_per_km[np.isfinite(after.exact_m_per_km)]
-    return [*estimated, ("measured", f"{known.mean():.2f}", "", "", "", "")]
+    return [Table(("IRI", "Mean [m/km]", "Bias", "R2", "Within 1", "Within 2"), [
+        _row("estimated with the first file", figures_of(before)),
+        _row("estimated with the last file", figures_of(after)),
+        ("measured", f"{known.mean():.2f}", "", "", "", "")]),
+        Hint("Within 1, 2: share of windows with the truth within one, two standard errors (ideal: 68 %, 95 %).")]
 
 
 def _row(name: str, found: dict[str, Any]) -> tuple[str, ...]:
@@ -478,38 +454,32 @@ def field_page(title: str, about: Sequence[str], measured: Sequence[MapLine], dr
     before, after     the road of a drive that the lab did not see, by the file as it was and by the last one
     answer            what is true, where that is known
     """
-    return doc.document(title, [
-        doc.heading(title, ", ".join(one.name for one in driven)),
-        _field_tiles(story, before, after), doc.paragraphs(about),
-        doc.section("The drives", ways_map(measured, driven) + doc.hint(
-            "Wide: the measured lines. Dots: the car's GPS positions, one a second.")),
-        doc.section("NRMSE, model by model", falling(f"NRMSE on {JUDGED_ON}", steps(story), story.floor)
-                    + doc.paragraphs(ending(story))),
-        doc.section("What was missing", doc.concatenated(
-            doc.paragraphs(diagnosis_summary(one)) for one in story.diagnoses[:1])),
-        doc.section("Before and after", residual_spectra(story)) if story.rounds else "",
-        doc.section("The IRI of a drive that the lab did not see", _iri(before, after)
-                    + doc.grid(HEADS, rows(before, after), words=(0,)) + doc.hint(IN_HINT)),
-        doc.section("The answer", doc.bullets(answer)),
-    ])
-
-
-def _field_tiles(story: Story, before: Assessment, after: Assessment) -> doc.Html:
     first, last = (figures_of(one)["comparison"] for one in (before, after))
-    return doc.tiles([
-        ("Bias of the IRI, initially", f"{first['bias']:+.1%}", f"R2 {first['r2']:.2f}"),
-        ("finally", f"{last['bias']:+.1%}", f"R2 {last['r2']:.2f}"),
-        ("NRMSE, initially", f"{steps(story)[0][1]:.3f}", "file unchanged"),
-        ("finally", f"{steps(story)[-1][1]:.3f}", "refitted"),
+    return page(title, ", ".join(one.name for one in driven), [
+        doc.tiles([
+            ("Bias of the IRI, initially", f"{first['bias']:+.1%}", f"R2 {first['r2']:.2f}"),
+            ("finally", f"{last['bias']:+.1%}", f"R2 {last['r2']:.2f}"),
+            ("NRMSE, initially", f"{steps(story)[0][1]:.3f}", "file unchanged"),
+            ("finally", f"{steps(story)[-1][1]:.3f}", "refitted"),
+        ]),
+        *about,
+        Section("The drives", [ways_map(measured, driven), Hint(
+            "Wide: the measured lines. Dots: the car's GPS positions, one a second.")]),
+        Section("NRMSE, model by model", [falling(f"NRMSE on {JUDGED_ON}", steps(story), story.floor),
+                                          *ending(story)]),
+        Section("What was missing", diagnosing.diagnosis_summary(story.diagnoses[0])),
+        Section("Before and after", [residual_spectra(story)] if story.rounds else []),
+        Section("The IRI of a drive that the lab did not see", [_iri(before, after), *iri_blocks(before, after)]),
+        Section("The answer", [Bullets(answer)]),
     ])
 
 
-def _iri(before: Assessment, after: Assessment) -> doc.Html:
+def _iri(before: Assessment, after: Assessment) -> Curves:
     exact = np.isfinite(after.exact_m_per_km)
     lines = (_line("finally", after, True), _line("initially", before, False),
              Line("truth", _middles_m(after)[exact], after.exact_m_per_km[exact]))
-    return chart(Curves(f"IRI over {after.window_m:.4g} m, finally with its standard error",
-                        "distance along the line [m]", "IRI [m/km]", lines))
+    return Curves(f"IRI over {after.window_m:.4g} m, finally with its standard error", "distance along the line [m]",
+                  "IRI [m/km]", lines)
 
 
 def _line(name: str, one: Assessment, band: bool) -> Line:

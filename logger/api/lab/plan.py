@@ -5,7 +5,7 @@ The answer, its words for a person and for a program, and the page with numbers 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import log
 from pathlib import Path
@@ -32,7 +32,7 @@ from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.profiles.track import Track
 from logger.question import function
 from logger.report import document as doc
-from logger.report.quantities import columns, wrapped
+from logger.report.blocks import Block, Bullets, Detail, Hint, Section, Table, Told, page
 from logger.runs import Past, Run
 from logger.store.formats import drive_file, profile_file, vehicle_file
 
@@ -78,7 +78,8 @@ class Plan(CommandResult):
 
     def as_page(self, of: str) -> doc.Html:
         """The plan as one HTML document."""
-        return page(self.found, self.vehicle)
+        drives = ", ".join(f"{name}, {seconds:.0f} s" for name, seconds in self.found.drives)
+        return page(f"{self.vehicle}: which effects could these drives show?", drives, self.blocks())
 
 
 def plan_by(question: PlanQuestion) -> Plan:
@@ -114,7 +115,7 @@ plan = function("plan", PlanQuestion, plan_by)
 def plan_of(found: LabPlan, vehicle: str) -> Plan:
     """What the lab found, as it is shown."""
     summary = as_json(found)
-    return Plan("\n".join(plan_lines(found)), summary, found, vehicle, summary["detectability"],
+    return Plan(Told(plan_blocks(found)), summary, found, vehicle, summary["detectability"],
                 summary["isolability"], tuple(map(tuple, found.groups)),
                 tuple(NextDrive(do_words(one.option), dict(one.gains), one.more_named) for one in found.next),
                 summary["noise_mps2"])
@@ -144,8 +145,6 @@ def _longest_road(bench: Bench | None) -> Track | None:
 
 
 _MOST_NEXT, _MOST_GAINS = 5, 4
-HEADS = ("Effect", "Detectability", "Isolability", "Most like", "")
-GAIN_HINT = "More named: the expected number of further effects that diagnose would name."
 SENSOR_HINT = ("Assumed noise: a second accelerometer as the first one, a travel sensor 0.5 mm, a gyroscope "
                "0.001 rad/s.")
 _OBSTACLES = {"bump": "a speed bump {height_m:g} m high and {width_m:g} m long",
@@ -201,16 +200,26 @@ def meaning() -> str:
             f"fitted in its place; {ISOLABLE_SIGMA:.1f} needed.")
 
 
-def plan_lines(found: LabPlan) -> list[str]:
+def plan_blocks(found: LabPlan) -> Iterator[Block]:
     """What a person reads of a plan."""
-    lines = [wrapped(summary(found)), "", *columns([HEADS, *rows(found)]), "", wrapped([meaning()])]
+    yield doc.tiles([
+        ("Effects that could be named", f"{int((found.now.chances > 0.5).sum())}", f"of {len(found.names)}"),
+        ("Too faint", f"{int((found.now.detectability < DETECTABLE_SIGMA).sum())}", ""),
+        ("Groups not distinguished", f"{len(found.groups)}", ""),
+        ("Noise", f"{found.noise.variance**0.5:.3g}", "m/s2 r.m.s.")])
+    yield from summary(found)
+    yield Detail("Which effects are distinguished", [figure(found)])
+    yield Section("Each effect", [Table(("Effect", "Detectability", "Isolability", "Most like", ""), rows(found),
+                                        (0, 3, 4)), Hint(meaning())])
     if found.next:
-        lines += ["", "Drives that would add most:"]
-        lines += [wrapped([f"{number}. {next_words(one)}"]) for number, one in enumerate(found.next[:_MOST_NEXT], 1)]
-        lines.append(wrapped([SENSOR_HINT]))
+        yield Section("Drives that would add most", [
+            *(f"{number}. {next_words(one)}" for number, one in enumerate(found.next[:_MOST_NEXT], 1)),
+            Hint(SENSOR_HINT)])
     else:
-        lines += ["", wrapped(["No further drive to propose: the road is too short, or too rough for these speeds."])]
-    return lines
+        yield "No further drive to propose: the road is too short, or too rough for these speeds."
+    yield Detail("Sources", [Bullets([
+        "G. Cowan, K. Cranmer, E. Gross, O. Vitells, European Physical Journal C 71, 1554 (2011): what is expected to "
+        "be found, from one data set without noise."])])
 
 
 def do_words(option: DriveOption) -> str:
@@ -262,26 +271,6 @@ def as_json(found: LabPlan) -> dict[str, Any]:
 _FULL = 100.0  # deviations that are drawn as dark as any
 
 
-def page(found: LabPlan, vehicle: str) -> doc.Html:
-    """The plan as one HTML document."""
-    title = f"{vehicle}: which effects could these drives show?"
-    chances = found.now.chances
-    return doc.document(title, [
-        doc.heading(title, ", ".join(f"{name}, {seconds:.0f} s" for name, seconds in found.drives)),
-        doc.tiles([("Effects that could be named", f"{int((chances > 0.5).sum())}", f"of {len(found.names)}"),
-                   ("Too faint", f"{int((found.now.detectability < DETECTABLE_SIGMA).sum())}", ""),
-                   ("Groups not distinguished", f"{len(found.groups)}", ""),
-                   ("Noise", f"{found.noise.variance**0.5:.3g}", "m/s2 r.m.s.")]),
-        doc.paragraphs(summary(found)),
-        doc.section("Which effects are distinguished", figure(found) + doc.hint(meaning())),
-        doc.section("Each effect", doc.grid(HEADS, rows(found), words=(0, 3, 4))),
-        doc.section("What another drive would add", _next(found)),
-        doc.section("Sources", doc.bullets([
-            "G. Cowan, K. Cranmer, E. Gross, O. Vitells, European Physical Journal C 71, 1554 (2011): what is expected "
-            "to be found, from one data set without noise."])),
-    ])
-
-
 def figure(found: LabPlan) -> doc.Html:
     """The matrix: each row an effect that is there; in its own column how far it stands out, in the others what remains
     when that one is fitted in its place. Those that stand out most first."""
@@ -290,17 +279,6 @@ def figure(found: LabPlan) -> doc.Html:
                     "place; framed: its detectability",
                     [found.names[one] for one in order], found.now.pairwise[np.ix_(order, order)],
                     ISOLABLE_SIGMA, _FULL)
-
-
-def _next(found: LabPlan) -> doc.Html:
-    """Nothing where there is none."""
-    if not found.next:
-        return doc.EMPTY
-    drawn = doc.grid(("Drive", "More named", "Standard deviations gained"), [
-        (do_words(one.option), f"{one.more_named:.1f}",
-         ", ".join(f"{name} {number(each)}" for name, each in list(one.gains.items())[:6])) for one in found.next],
-        words=(0, 2))
-    return drawn + doc.hint(f"{GAIN_HINT} {SENSOR_HINT}")
 
 
 _CELL_PX, _HIGH_PX, _LEFT_PX, _TOP_PX, _ROOM_PX = 40, 24, 190, 150, 60

@@ -18,8 +18,8 @@ from logger.lab.residuals.sensor_drift import EXPONENTIAL, OFFSET, RAMP, STEP, W
 from logger.lab.residuals.unexplained import Shape, SpatialLine
 from logger.lab.selection.holdout import AS_FILED, JUDGED_ON, REFITTED, ErrorStep, fit_percent, rising
 from logger.printable import percent
-from logger.report.charts import Steps, chart, steps_figure
-from logger.report.document import EMPTY, Html, grid, hint, section
+from logger.report.blocks import Block, Detail, Hint, Table
+from logger.report.charts import Steps
 from logger.report.quantities import enumerated
 from logger.runs import shortened
 
@@ -121,10 +121,8 @@ def removed_json(found: Removed) -> dict[str, Any]:
     }
 
 
-def removed_section(found: Removed, band: ComparedBand | None) -> Html:
+def removed_section(found: Removed, band: ComparedBand | None) -> Detail:
     """A page's part on it; nothing where nothing was removed that is more than usual."""
-    if not removed_words(found, band):
-        return EMPTY
     rows = []
     if found.drifting_sensors:
         rows.append(("sensor drift", percent(found.drift_share), drift_words(found)))
@@ -133,8 +131,9 @@ def removed_section(found: Removed, band: ComparedBand | None) -> Html:
     if band is not None:
         rows.append(("outside the pass band", percent(found.filter_share),
                      f"compared from {band.low_hz:.3g} to {band.high_hz:.3g} Hz"))
-    return section("Removed before judging", grid(HEADS, rows, words=(0, 2)) + _picture(found)
-                   + hint("Shares of the residual's power with the vehicle's file as it is."))
+    return Detail("Removed before judging", [
+        Table(HEADS, rows, (0, 2)), *_picture(found),
+        Hint("Shares of the residual's power with the vehicle's file as it is.")])
 
 
 def drift_tile(found: Removed) -> list[tuple[str, str, str]]:
@@ -142,13 +141,13 @@ def drift_tile(found: Removed) -> list[tuple[str, str, str]]:
     return [("Without the sensor's drift", f"{found.error:.3f}", "refitted")] if found.drifting_sensors else []
 
 
-def _picture(found: Removed) -> Html:
+def _picture(found: Removed) -> list[Curves]:
     if not found.drifting_sensors:
-        return EMPTY
+        return []
     names = shortened([one.run for one in found.drifts])
     lines = tuple(Line(names[one.run], np.arange(len(one.curve_mps2)) / one.rate_hz, one.curve_mps2)
                   for one in found.drifting_sensors[:2 * _MOST])
-    return chart(Curves("Sensor drift", "time [s]", "acceleration [m/s2]", lines))
+    return [Curves("Sensor drift", "time [s]", "acceleration [m/s2]", lines)]
 
 
 def _said(one: Drift) -> str:
@@ -204,12 +203,13 @@ def band_json(band: ComparedBand | None) -> dict[str, Any]:
     return {"pass_band_hz": [band.low_hz, band.high_hz], "low_passed_at_hz": band.cutoff_hz}
 
 
-def steps_table(steps: Sequence[tuple[str, float]], floor: float) -> Html:
+def steps_section(steps: Sequence[tuple[str, float]], floor: float, *more: Block) -> Detail:
     """The error of each step on what no fit saw, as a falling curve and as a table."""
     rows = [(f"{number}", words, f"{error:.4f}") for number, (words, error) in enumerate(steps)]
-    return falling(f"NRMSE on {JUDGED_ON}", steps, floor) + grid(("Step", "Model", "NRMSE"), rows, words=(0, 1))
+    return Detail("NRMSE, model by model", [falling(f"NRMSE on {JUDGED_ON}", steps, floor),
+                                            Table(("Step", "Model", "NRMSE"), rows, (0, 1)), *more])
 
 
-def falling(title: str, steps: Sequence[tuple[str, float]], floor: float) -> Html:
+def falling(title: str, steps: Sequence[tuple[str, float]], floor: float) -> Steps:
     """The error of each step as a falling curve, down to the noise."""
-    return steps_figure(Steps(title, "NRMSE", tuple(steps), (floor, "noise floor")))
+    return Steps(title, "NRMSE", tuple(steps), (floor, "noise floor"))
