@@ -18,14 +18,16 @@ from zlib import crc32
 
 import numpy as np
 
+from logger.arrays import Array
 from logger.lab.likelihood.by_squares import BySquares
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit, fit_model
 from logger.lab.likelihood.posterior import NotSimulated, Posterior, State
+from logger.lab.likelihood.priors import VehiclePrior
 from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly
 from logger.lab.selection.evidence import INDISTINGUISHABLE
-from logger.lab.selection.screening import Baseline, Screened, effects_without
+from logger.lab.selection.screening import Baseline, Screened, Trial, effects_without
 from logger.lab.selection.stepwise import MeasuredRoad, Progress
 from logger.simulation.virtual_drive import SEARCH_HZ
 from logger.vehicle.effect import Chosen, Effect, Misalignment, chosen
@@ -33,6 +35,8 @@ from logger.vehicle.named_parameters import WEAKEST
 
 _Drawn = tuple[float, State]
 """A car with its deviance by squares."""
+_Car = tuple[list[Chosen], Array]
+"""A car's effects and numbers."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,6 +71,7 @@ class UnknownNumbers(MeasuredRoad):
     starts: int = 2
     ends: dict[str, tuple[int, int]] = field(default_factory=dict)
     _squares: dict[int, tuple[Posterior, BySquares]] = field(default_factory=dict)
+    _ended: dict[frozenset[str], Sequence[State]] = field(default_factory=dict)
 
     def fitted(self, posterior: Posterior, present: Sequence[Chosen], near: State | None = None) -> Baseline:
         """The model with some effects, fitted from where it is or else from the file's car, and from cars that are
@@ -88,7 +93,7 @@ class UnknownNumbers(MeasuredRoad):
         without = by_squares.deviance(anchor)
 
         def begun(one: Screened) -> Screened:
-            drawn = self._cars(by_squares, one.effect, anchor)
+            drawn = self._cars(by_squares, one.effect, anchor, one.trials)
             if not (ends := _improved(by_squares, [some[0] for some in drawn if some], 4)):
                 return one
             return Started(one.effect, one.trials, [one for some in drawn for one in some[1:]], ends,
@@ -105,6 +110,9 @@ class UnknownNumbers(MeasuredRoad):
         for best in (-(-len(found) // 2), -(-len(found) // 4)):
             found[:best] = pool.map(farther, found[:best])
             found.sort(key=_by_gain)
+        for one in found:
+            if isinstance(one, Started):
+                self._keep([state for _, state in one.ends])
         return found
 
     def stripped(self, now: Baseline, name: str) -> None:  # type: ignore[override]
@@ -117,6 +125,7 @@ class UnknownNumbers(MeasuredRoad):
             return fit_roughly(score, base, one, least)
         by_squares = self._by_squares(base.posterior)
         ends = sorted([*one.ends, *_improved(by_squares, one.others, 12)], key=_by_deviance)
+        self._keep([state for _, state in ends])
         trials = {trial.one.is_plain: trial for trial in reversed(one.trials)}
         best = {state.effects[-1].is_plain: state for _, state in reversed(ends)}
         found = fit_roughly(score, base, replace(one, trials=tuple(trials.values())))
@@ -157,30 +166,60 @@ class UnknownNumbers(MeasuredRoad):
         begun = [] if here is None else [by_squares.improved(here[1], 6)]
         drawn = self._cars(by_squares, None, near)
         begun += _improved(by_squares, [one for some in drawn for one in some[:count]], 12)
-        return min(begun, key=_by_deviance)[1]
+        begun.sort(key=_by_deviance)
+        self._keep([state for _, state in begun])
+        return begun[0][1]
 
-    def _cars(self, by_squares: BySquares, effect: Effect | None, near: State) -> list[list[_Drawn]]:
-        """The best of cars that were drawn around the file's, and as many of those around a state, the best first; of
-        the effect in its plain form, and as many with its refinements. A state without the effect is in a valley of its
-        own, whose cars are the better ones before they are improved."""
-        prior = by_squares.posterior.prior
+    def _keep(self, ends: Sequence[State]) -> None:
+        """Ends of starts of one model, from which later rounds begin."""
+        self._ended[frozenset(one.effect.name for one in ends[0].effects)] = ends
+
+    def _cars(self, by_squares: BySquares, effect: Effect | None, near: State, trials: Sequence[Trial] = ()
+              ) -> list[list[_Drawn]]:
+        """The best cars of each kind with the effects of a state and one more, the best first. Cars are drawn once for
+        an effect; later rounds begin where these ended, and at its trials on the model."""
+        cars = self._known(effect, near, trials) or self._draw(effect, by_squares.posterior.prior, near)
+        ranked = [[(by_squares.rank(effects, logs, near), effects, logs) for effects, logs in some] for some in cars]
+        return [[state for _, having, there in sorted(some, key=_by_deviance)[: self.starts]
+                 if (state := by_squares.at(having, there, near)) is not None] for some in ranked]
+
+    def _known(self, effect: Effect | None, near: State, trials: Sequence[Trial]) -> list[list[_Car]]:
+        """Cars where earlier starts ended of the same model, or of others with the effect, and at its trials; in its
+        plain form, and with refinements. Empty: there are none."""
+        names = [one.effect.name for one in near.effects] + ([effect.name] if effect else [])
+        cars: list[_Car] = []
+        for having, ends in list(self._ended.items()):
+            for end in ends:
+                by_name = {one.effect.name: one for one in end.effects}
+                if having == {*names}:
+                    cars.append(([by_name[name] for name in names], end.logs))
+                elif effect and effect.name in having:
+                    cars += [([*near.effects, by_name[effect.name]], logs) for logs in (near.logs, end.logs)]
+        if effect and cars:
+            cars += [([*near.effects, one.one], one.logs) for one in trials]
+        forms = [[car for car in cars if not effect or car[0][-1].is_plain is plain] for plain in (True, False)]
+        return [some for some in forms[: 2 if effect else 1] if some]
+
+    def _draw(self, effect: Effect | None, prior: VehiclePrior, near: State) -> list[list[_Car]]:
+        """Cars that are drawn around the file's, and as many around a state; with the effect in its plain form, and as
+        many with its refinements. A state without the effect is in a valley of its own, whose cars are the better ones
+        before they are improved."""
         rng = np.random.default_rng(crc32((effect.name if effect else "").encode()))
         trials = [chosen(effect, values) for values in effect.trials()] if effect else []
         forms = [some for plain in (True, False) if (some := [one for one in trials if one.is_plain is plain])]
-        drawn: list[list[Any]] = [[] for _ in range(2 * max(len(forms), 1))]
+        drawn: list[list[_Car]] = [[] for _ in range(2 * max(len(forms), 1))]
         for number in range(self.draws):
             logs = near.logs * (number % 2)
             if number > 1:
                 logs = logs + np.minimum(prior.deviations, WEAKEST) * rng.standard_normal(len(logs))
-            effects = [_drawn(one, rng, WEAKEST) for one in near.effects]
+            effects = [_resized(one, rng, WEAKEST) for one in near.effects]
             pair, kind = divmod(number, len(drawn))
             if forms:
                 some = forms[kind // 2]
                 # Usual sizes follow the vehicle's by powers of ten (``sized``).
-                effects.append(_drawn(some[pair % len(some)], rng, float(np.log(10.0)) / 2))
-            drawn[kind].append((by_squares.rank(effects, logs, near), effects, logs))
-        return [[state for _, having, there in sorted(some, key=_by_deviance)[: self.starts]
-                 if (state := by_squares.at(having, there, near)) is not None] for some in drawn]
+                effects.append(_resized(some[pair % len(some)], rng, float(np.log(10.0)) / 2))
+            drawn[kind].append((effects, logs))
+        return drawn
 
 
 def fitted_from_starts(posterior: Posterior, present: Sequence[Chosen]) -> LinearModel:
@@ -205,7 +244,7 @@ def _by_deviance(one: tuple[float, *tuple[Any, ...]]) -> float:
     return one[0]
 
 
-def _drawn(one: Chosen, rng: np.random.Generator, spread: float) -> Chosen:
+def _resized(one: Chosen, rng: np.random.Generator, spread: float) -> Chosen:
     """An effect with its sizes drawn around those that it has, by a standard deviation of their logarithms."""
     values: dict[str, Any] = dict(one.values)
     for parameter in one.freed:

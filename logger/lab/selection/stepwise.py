@@ -202,8 +202,7 @@ class MeasuredRoad:
 
     def with_effect(self, one: CandidateFit) -> Baseline:
         """The model with the effect, its runs aligned again."""
-        found = with_refinements(one.found.score + one.gain, one).found
-        return Baseline.of(fit(align(found.posterior, found.state), found.numbers))
+        return Baseline.of(fit(align(one.found.posterior, one.found.state), one.found.numbers))
 
     def refined_beside(self, now: Baseline, name: str) -> Baseline:
         """Begun where the model ended."""
@@ -310,7 +309,7 @@ class Search(Generic[M, P, F]):
         on the model that it goes on from."""
         before, now, first, steps = begun.before, begun.now, begun.first, list(begun.steps)
         last = begun.last
-        while len(now.effects) - self.present < self.effort.effects:
+        while len((now := self._refined(now)).effects) - self.present < self.effort.effects:
             untried = [one for one in self.effects if one.name not in names_of(now)]
             if not untried:
                 break
@@ -364,16 +363,24 @@ class Search(Generic[M, P, F]):
         known = wider.round(now, more, beside=begun.last) if begun.last.on is now else None
         return wider, wider.go_on(replace(begun, now=now, first=first), known)
 
+    def _refinable(self, now: M) -> list[str]:
+        """Names of the effects that were found, in their plain form, and have another."""
+        return [one.effect.name for one in now.effects[self.present:] if one.effect.refinements and one.is_plain]
+
+    def _refined(self, now: M) -> M:
+        """The model with refinements of the effects that were found, each where it explains most of what is left. They
+        are judged before a further effect is sought, which may only imitate one."""
+        for name in self._refinable(now) if now.explanation else ():
+            now = self.likelihood.refined_beside(now, name)
+        return now
+
     def _with_refinements(self, now: M, tried: SearchRound[P, F]) -> tuple[F, M] | None:
         """The best of the effects that gain so little that they may imitate something, and the model with it, where
         that and refinements of those before it together explain most of what is left; None: they do not."""
         best = next((one for one in tried.fits if self.may_imitate(now, one)), None)
-        plain = [one.effect.name for one in now.effects[self.present:] if one.effect.refinements and one.is_plain]
-        if best is None or not plain:
+        if best is None or not self._refinable(now):
             return None
-        grown = self.likelihood.with_effect(best)
-        for name in plain:
-            grown = self.likelihood.refined_beside(grown, name)
+        grown = self._refined(self.likelihood.with_effect(best))
         return (best, grown) if self.likelihood.explains_most(now, grown) else None
 
     def _reconsidered(self, now: M, tried: SearchRound[P, F]) -> M:
