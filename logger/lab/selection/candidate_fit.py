@@ -99,10 +99,9 @@ def refine(score: float, one: CandidateFit, worth: float = 0.0, rounds: int = 3)
     return CandidateFit.of(score, fit(one.found.linearise(), one.found.numbers, rounds, worth))
 
 
-def with_refinements(score: float, one: CandidateFit, place: int = -1) -> CandidateFit:
-    """The fit with an effect, the last or that at another place, in its plain form, or one with its refinements that
-    begins there, if that explains most of what the plain one leaves, and of what one that begins where it ended leaves,
-    too."""
+def with_refinements(score: float, one: CandidateFit, place: int) -> CandidateFit:
+    """The fit with an effect, that at a place, in its plain form, or one with its refinements that begins there, if
+    that explains most of what the plain one leaves, and of what one that begins where it ended leaves, too."""
     effect = one.found.state.effects[place].effect
     if not effect.refinements or not one.found.state.effects[place].is_plain:
         return one

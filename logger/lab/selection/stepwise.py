@@ -198,7 +198,7 @@ class MeasuredRoad:
 
     def refined(self, base: Baseline, one: CandidateFit, least: float) -> CandidateFit:
         """The fit with derivatives of its own."""
-        return with_refinements(base.score, refine(base.score, one, least))
+        return refine(base.score, one, least)
 
     def with_effect(self, one: CandidateFit) -> Baseline:
         """The model with the effect, its runs aligned again."""
@@ -207,8 +207,8 @@ class MeasuredRoad:
     def refined_beside(self, now: Baseline, name: str) -> Baseline:
         """Begun where the model ended."""
         plain = CandidateFit.of(now.score, now.linear)
-        refined = with_refinements(now.score, plain, names_of(now).index(name))
-        return Baseline.of(refined.found.linearise()) if refined.hold_out.explains_most_beyond(now.hold_out) else now
+        best = with_refinements(now.score, plain, names_of(now).index(name))
+        return now if best is plain else Baseline.of(best.found.linearise())
 
     def chance(self, one: Chosen, gain: float, base: Baseline, candidates: int) -> float:
         """By the evidence and by the likelihood."""

@@ -59,10 +59,11 @@ class Tried:
 
 @dataclass(frozen=True)
 class MadeUp:
-    """The likelihood; some effects are doubtful. ``fitted``: names of what was fitted, and how many effects there were.
-    """
+    """The likelihood; some effects are doubtful, and refinements explain something where so many effects are found.
+    ``fitted``: names of what was fitted, and how many effects there were."""
 
     doubtful: tuple[str, ...] = ()
+    refined_from: int = 1
     fitted: list[tuple[str, int]] = field(default_factory=list)
 
     def screened(self, base: Made, effects: Sequence[Effect], seen: Misalignment, near: Chosen | None,
@@ -89,6 +90,8 @@ class MadeUp:
         return one.model
 
     def refined_beside(self, now: Made, name: str) -> Made:
+        if len(now.effects) < self.refined_from:
+            return now
         by_name = {one.effect.name: one for one in now.effects}
         refined = replace(by_name[name], values={**by_name[name].values, "static_to_sliding_ratio": 1.5})
         return replace(now, effects=tuple({**by_name, name: refined}.values()))
@@ -171,9 +174,21 @@ def test_what_seems_to_imitate_is_found_where_it_shows_refinements_of_what_was_f
     monkeypatch.setitem(WORTH, known, 700.0)
     sought = search()
     sought.effects = [EFFECTS[known], EFFECTS["sensor_offset"]]
+    sought.likelihood = MadeUp(refined_from=2)
     found = sought.run(Made(explains=610.0))
     assert list(found.gains) == [known, "sensor_offset"][: 1 + friction]
     assert [one.is_plain for one in found.now.effects] == [False, True][-1 - friction:]
+
+
+def test_refinements_of_what_was_found_are_judged_before_a_further_effect_is_sought(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(WORTH, "dry_friction", 700.0)
+    sought, bases = search(effects=2), list[Made]()
+    sought.effects = [EFFECTS["dry_friction"], EFFECTS["sensor_gain"]]
+    screened = MadeUp.screened
+    monkeypatch.setattr(MadeUp, "screened", lambda self, base, *rest: bases.append(base) or screened(self, base, *rest))
+    sought.run(Made())
+    assert [[one.is_plain for one in base.effects] for base in bases[:2]] == [[], [False]]
 
 
 @pytest.mark.parametrize("later", WORTH)
