@@ -91,10 +91,11 @@ class BySquares:
         loudest = max(self.kept, key=lambda one: float(self.whole.runs.runs[one].kept_mps2.std()))
         return self if len(self.kept) == 1 else BySquares(self.whole, [loudest])
 
-    def improved(self, start: State, rounds: int) -> tuple[float, State]:
-        """A state improved in so many rounds of steps, and its deviance."""
+    def improved(self, start: State, rounds: int, to_reach: float = np.inf) -> tuple[float, State]:
+        """A state improved in so many rounds of steps, and its deviance; as long as those that are left may reach a
+        deviance at the pace of the last."""
         least, best = self.deviance(start), start
-        for _ in range(rounds):
+        for left in reversed(range(rounds)):
             try:
                 with np.errstate(all="ignore"):
                     linear = LinearModel(self.posterior, best, self.posterior.number_slopes(
@@ -106,7 +107,7 @@ class BySquares:
                 break
             if not deviance < least:
                 break
-            enough = deviance > least - CONVERGED
+            enough = least - deviance < max(CONVERGED, (deviance - to_reach) / max(left, 1))
             least, best = deviance, found
             if enough:
                 break

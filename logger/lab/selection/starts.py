@@ -124,7 +124,10 @@ class UnknownNumbers(MeasuredRoad):
         if not isinstance(one, Started):
             return fit_roughly(score, base, one, least)
         by_squares = self._by_squares(base.posterior)
-        ends = sorted([*one.ends, *_improved(by_squares, one.others, 12)], key=_by_deviance)
+        reached = {state.effects[-1].is_plain: deviance for deviance, state in reversed(one.ends)}
+        ends = sorted([*one.ends, *(
+            by_squares.improved(state, 12, reached.get(state.effects[-1].is_plain, np.inf)) for _, state in one.others)],
+            key=_by_deviance)
         self._keep([state for _, state in ends])
         trials = {trial.one.is_plain: trial for trial in reversed(one.trials)}
         best = {state.effects[-1].is_plain: state for _, state in reversed(ends)}
