@@ -125,9 +125,9 @@ class UnknownNumbers(MeasuredRoad):
             return fit_roughly(score, base, one, least)
         by_squares = self._by_squares(base.posterior)
         reached = {state.effects[-1].is_plain: deviance for deviance, state in reversed(one.ends)}
-        ends = sorted([*one.ends, *(
-            by_squares.improved(state, 12, reached.get(state.effects[-1].is_plain, np.inf)) for _, state in one.others)],
-            key=_by_deviance)
+        others = (by_squares.improved(state, 12, reached.get(state.effects[-1].is_plain, np.inf))
+                  for _, state in one.others)
+        ends = sorted([*one.ends, *others], key=_by_deviance)
         self._keep([state for _, state in ends])
         trials = {trial.one.is_plain: trial for trial in reversed(one.trials)}
         best = {state.effects[-1].is_plain: state for _, state in reversed(ends)}
