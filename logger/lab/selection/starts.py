@@ -71,7 +71,7 @@ class UnknownNumbers(MeasuredRoad):
     starts: int = 2
     ends: dict[str, tuple[int, int]] = field(default_factory=dict)
     _squares: dict[int, tuple[Posterior, BySquares]] = field(default_factory=dict)
-    _ended: dict[frozenset[str], Sequence[State]] = field(default_factory=dict)
+    _ended: dict[frozenset[str], Sequence[_Drawn]] = field(default_factory=dict)
 
     def fitted(self, posterior: Posterior, present: Sequence[Chosen], near: State | None = None) -> Baseline:
         """The model with some effects, fitted from where it is or else from the file's car, and from cars that are
@@ -110,9 +110,7 @@ class UnknownNumbers(MeasuredRoad):
         for best in (-(-len(found) // 2), -(-len(found) // 4)):
             found[:best] = pool.map(farther, found[:best])
             found.sort(key=_by_gain)
-        for one in found:
-            if isinstance(one, Started):
-                self._keep([state for _, state in one.ends])
+        self._keep(*(one.ends for one in found if isinstance(one, Started)))
         return found
 
     def stripped(self, now: Baseline, name: str) -> None:  # type: ignore[override]
@@ -128,7 +126,7 @@ class UnknownNumbers(MeasuredRoad):
         others = (by_squares.improved(state, 12, reached.get(state.effects[-1].is_plain, np.inf))
                   for _, state in one.others)
         ends = sorted([*one.ends, *others], key=_by_deviance)
-        self._keep([state for _, state in ends])
+        self._keep(ends)
         trials = {trial.one.is_plain: trial for trial in reversed(one.trials)}
         best = {state.effects[-1].is_plain: state for _, state in reversed(ends)}
         found = fit_roughly(score, base, replace(one, trials=tuple(trials.values())))
@@ -169,13 +167,12 @@ class UnknownNumbers(MeasuredRoad):
         begun = [] if here is None else [by_squares.improved(here[1], 6)]
         drawn = self._cars(by_squares, None, near)
         begun += _improved(by_squares, [one for some in drawn for one in some[:count]], 12)
-        begun.sort(key=_by_deviance)
-        self._keep([state for _, state in begun])
-        return begun[0][1]
+        self._keep(begun)
+        return min(begun, key=_by_deviance)[1]
 
-    def _keep(self, ends: Sequence[State]) -> None:
-        """Ends of starts of one model, from which later rounds begin."""
-        self._ended[frozenset(one.effect.name for one in ends[0].effects)] = ends
+    def _keep(self, *ends: Sequence[_Drawn]) -> None:
+        """Ends of starts, each of one model, where later rounds begin."""
+        self._ended |= {frozenset(one.effect.name for one in some[0][1].effects): some for some in ends}
 
     def _cars(self, by_squares: BySquares, effect: Effect | None, near: State, trials: Sequence[Trial] = ()
               ) -> list[list[_Drawn]]:
@@ -187,21 +184,19 @@ class UnknownNumbers(MeasuredRoad):
                  if (state := by_squares.at(having, there, near)) is not None] for some in ranked]
 
     def _known(self, effect: Effect | None, near: State, trials: Sequence[Trial]) -> list[list[_Car]]:
-        """Cars where earlier starts ended of the same model, or of others with the effect, and at its trials; in its
-        plain form, and with refinements. Empty: there are none."""
-        names = [one.effect.name for one in near.effects] + ([effect.name] if effect else [])
+        """Cars where starts of the same model ended, or of another with the effect, and those at its trials: with the
+        effect in its plain form, and with its refinements. Empty: there are none."""
+        names = [*(one.effect.name for one in near.effects), *([effect.name] if effect else [])]
         cars: list[_Car] = []
         for having, ends in list(self._ended.items()):
-            for end in ends:
-                by_name = {one.effect.name: one for one in end.effects}
-                if having == {*names}:
-                    cars.append(([by_name[name] for name in names], end.logs))
-                elif effect and effect.name in having:
-                    cars += [([*near.effects, by_name[effect.name]], logs) for logs in (near.logs, end.logs)]
-        if effect and cars:
-            cars += [([*near.effects, one.one], one.logs) for one in trials]
-        forms = [[car for car in cars if not effect or car[0][-1].is_plain is plain] for plain in (True, False)]
-        return [some for some in forms[: 2 if effect else 1] if some]
+            for _, end in ends if having == {*names} or (effect and effect.name in having) else ():
+                by_name = {one.effect.name: one for one in (*near.effects, *end.effects)}
+                cars += [([by_name[name] for name in names], logs) for logs in (near.logs, end.logs)]
+        if not effect or not cars:
+            return [cars] if cars else []
+        cars += [([*near.effects, one.one], one.logs) for one in trials]
+        forms = ([car for car in cars if car[0][-1].is_plain is plain] for plain in (True, False))
+        return [some for some in forms if some]
 
     def _draw(self, effect: Effect | None, prior: VehiclePrior, near: State) -> list[list[_Car]]:
         """Cars that are drawn around the file's, and as many around a state; with the effect in its plain form, and as
