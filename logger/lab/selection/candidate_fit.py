@@ -99,32 +99,32 @@ def refine(score: float, one: CandidateFit, worth: float = 0.0, rounds: int = 3)
     return CandidateFit.of(score, fit(one.found.linearise(), one.found.numbers, rounds, worth))
 
 
-def with_refinements(score: float, one: CandidateFit, place: int) -> CandidateFit:
-    """The fit with an effect, that at a place, in its plain form, or one with its refinements that begins there, if
-    that explains most of what the plain one leaves, and of what one that begins where it ended leaves, too."""
-    effect = one.found.state.effects[place].effect
-    if not effect.refinements or not one.found.state.effects[place].is_plain:
-        return one
+def with_refinements(now: Baseline, name: str) -> Baseline:
+    """The model, or one with refinements of one of its effects, which has its plain form, that begins there, if that
+    explains most of what the plain one leaves, and of what one that begins where it ended leaves, too."""
+    plain = CandidateFit.of(now.score, now.linear)
+    place = [one.effect.name for one in now.effects].index(name)
+    effect = now.effects[place].effect
 
-    def fitted(found: CandidateFit, ways: Iterable[Mapping[str, float]]) -> CandidateFit:
-        posterior, state, numbers = found.found.posterior, found.found.state, found.found.numbers
-        begun = []
+    def fitted(found: MapFit, ways: Iterable[Mapping[str, float]]) -> CandidateFit:
+        state, begun = found.state, []
         for way in ways:
             effects = list(state.effects)
             effects[place] = replace(effects[place], values={
                 **effects[place].values, **{name: way[name] for name in effect.refinements}})
-            begun.append(LinearModel(posterior, posterior.state_at(effects, state.logs, state.record, state.size),
-                                     numbers))
-        return CandidateFit.of(score, fit(min(begun, key=lambda each: each.score), numbers))
+            begun.append(LinearModel(found.posterior, found.posterior.state_at(
+                effects, state.logs, state.record, state.size), found.numbers))
+        return CandidateFit.of(now.score, fit(min(begun, key=lambda each: each.score), found.numbers))
 
     try:
-        refined = fitted(one, (way for way in effect.trials() if not Chosen(effect, way).is_plain))
-        if refined.gain > one.gain + INDISTINGUISHABLE:
-            one = max(one, fitted(refined, [effect.usual]), key=lambda each: each.gain)
+        refined = fitted(plain.found, (way for way in effect.trials() if not Chosen(effect, way).is_plain))
+        if refined.gain > INDISTINGUISHABLE:
+            plain = max(plain, fitted(refined.found, [effect.usual]), key=lambda each: each.gain)
     except NotSimulated:
-        return one
-    better = refined.gain > one.gain + INDISTINGUISHABLE and refined.hold_out.explains_most_beyond(one.hold_out)
-    return refined if better and not refined.found.state.effects[place].is_refined_too_far else one
+        return now
+    better = refined.gain > plain.gain + INDISTINGUISHABLE and refined.hold_out.explains_most_beyond(plain.hold_out)
+    taken = better and not refined.found.state.effects[place].is_refined_too_far
+    return Baseline.of(refined.found.linearise()) if taken else now
 
 
 def refine_to_the_end(score: float, one: CandidateFit) -> CandidateFit:

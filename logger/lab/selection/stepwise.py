@@ -206,9 +206,7 @@ class MeasuredRoad:
 
     def refined_beside(self, now: Baseline, name: str) -> Baseline:
         """Begun where the model ended."""
-        plain = CandidateFit.of(now.score, now.linear)
-        best = with_refinements(now.score, plain, names_of(now).index(name))
-        return now if best is plain else Baseline.of(best.found.linearise())
+        return with_refinements(now, name)
 
     def chance(self, one: Chosen, gain: float, base: Baseline, candidates: int) -> float:
         """By the evidence and by the likelihood."""
