@@ -89,7 +89,7 @@ def fit_roughly(score: float, base: Baseline, screen: Screened, least: float = -
     fits = []
     for place, trial in enumerate(screen.trials):
         if not place or trial.gain > least:
-            with suppress(NotSimulated):
+            with suppress(*NotSimulated):
                 fits.append(_rough_fit(score, base, trial))
     return sorted(fits, key=lambda one: -one.gain)
 

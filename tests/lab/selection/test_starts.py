@@ -6,8 +6,12 @@ import numpy as np
 import pytest
 
 import ridelog
+from logger.lab.likelihood.by_squares import BySquares
+from logger.lab.likelihood.priors import Tolerance
+from logger.lab.selection.starts import UnknownNumbers
 
 from ...support.drives.bench_rig import Rig, shaken, swept_table, write_run
+from ...support.lab.secret_runs import car_off_by, posterior_of, secret_runs
 
 CANDIDATES = ("progressive_spring", "frame_friction", "dry_friction", "sensor_gain")
 FILE = ("name: bench\nmodel: quarter_car\nsprung_mass_kg: 2.5 +- 2%\nfront:\n  unsprung_mass_kg: {}\n"
@@ -35,3 +39,23 @@ def test_an_effect_is_found_though_the_file_is_off_by_a_factor_of_two(
         assert "starting points led to this result" in " ".join(str(found).split())
         assert found.steps[-1][1] < 0.2 * found.steps[1][1]
         assert np.isfinite([error for _, error in found.steps]).all()
+
+
+def test_cars_are_drawn_once_and_later_fits_begin_where_these_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    posterior = posterior_of(secret_runs(lasts_s=4.0), car_off_by(0.3, 2), Tolerance(numbers=0.5))
+    search, ranked, rank = UnknownNumbers(), list[float](), BySquares.rank
+    monkeypatch.setattr(BySquares, "rank", lambda *given: ranked.append(found := rank(*given)) or found)
+    first = search.fitted(posterior, ())
+    assert len(ranked) == search.draws
+    again = search.fitted(posterior, ())
+    assert len(ranked) < 1.2 * search.draws
+    assert again.score < first.score + 1.0
+
+
+def test_a_start_ends_early_where_it_cannot_reach_another_at_its_pace() -> None:
+    posterior = posterior_of(secret_runs(lasts_s=4.0), car_off_by(0.3, 2), Tolerance(numbers=0.5))
+    by_squares, start = BySquares.of(posterior), posterior.start()
+    begun, once, end = by_squares.deviance(start), by_squares.improved(start, 1)[0], by_squares.improved(start, 12)[0]
+    assert end < once < begun
+    assert by_squares.improved(start, 12, end)[0] == end
+    assert by_squares.improved(start, 12, once - 20 * (begun - once))[0] == once
