@@ -80,11 +80,11 @@ kg 1.6."""
 _LIMP, _ONE_SPEED = 0.1, 1.5
 """A damping ratio below it is that of a worn damper (new ones have 0.2 to 0.4); a ratio of speeds that is too small to
 tell the car's frequencies from the road's waves."""
-_UNEVEN = {"damping_ratio": -0.025, "unsprung_to_sprung": -0.06, "contact_patch_m": -0.04}
+_UNEVEN = {"damping_ratio": -0.014, "unsprung_to_sprung": -0.026, "contact_patch_m": -0.017}
 """What dampers that work harder in rebound do to the logarithms of the numbers that are found: 0.6, a root mean square
-of ratios from 1:1 to 2:1, of what 2:1 did to three simulated half cars (two sets of drives each, alike to a third; an
-IRI came out 4 to 8 % high). No reading tells it: their skewness and the body's answer to the envelope of the wheels'
-hop are those of a linear car within what 20 minutes show."""
+of ratios from 1:1 to 2:1, of what 2:1 did to eight simulated half cars (an IRI came out 1 to 4 % higher). No reading
+tells it: their skewness and the body's answer to the envelope of the wheels' hop are those of a linear car within what
+20 minutes show."""
 _SPEEDS_MPH = (10, 20, 30, 40, 50, 60, 70)
 _COMPARED = (*(f"{end}.{name}" for end in ("front", "rear") for name in ("bounce_hz", "damping_ratio", "hop_hz")),
              "wheelbase_m")

@@ -1,7 +1,11 @@
 """Ordinary drives of a car over roads that nobody measured, by equations of their own.
 
-The car is linear, so that what its sensor reads is the inverse transform of its two responses times what lies under its
-axles at each instant, whatever its speed does; nothing of the program's models is used.
+What the sensor of a linear car reads is the inverse transform of its responses times what lies under its axles at each
+instant, whatever its speed does; nothing of the program's models is used. The forces of dampers that work harder in
+rebound, and of friction, are further inputs of the same car: they follow from the rates of its suspensions, which
+follow from them. With the middle slope of such a force counted as a damper's, what remains of it has a slope of less
+than that of all dampers together, and as no passive suspension moves faster under a force than its dampers alone let
+it, putting the one into the other again and again ends at the motion (a contraction).
 """
 
 from __future__ import annotations
@@ -17,13 +21,15 @@ Array = np.ndarray
 RATE_HZ, FINE = 100, 4
 SPACING_M = 0.0125  # means over a tire between points: at 0.05 m a patch of 0.22 m acts as one of 0.24 m
 PAD = 4000
+SLIDES_MPS = 0.01  # rate at which friction is three quarters of all: a bushing holds below it
 MPH = 0.44704
 
 
 @dataclass(frozen=True)
 class UnmeasuredCar:
     """A half car by its ratios; ``ahead_m``: the sensor before the centre of gravity. Frequencies are those of each end
-    alone, without tire (bounce) and on springs and tire (hop)."""
+    alone, without tire (bounce) and on springs and tire (hop). Damping is the mean of both directions; ``rebound``:
+    that in rebound over that in compression; ``friction_n``: of each suspension."""
 
     wheelbase_m: float = 2.66
     rear_share: float = 0.43
@@ -33,29 +39,62 @@ class UnmeasuredCar:
     patch_m: float = 0.22
     ahead_m: float = 0.0
     mass_kg: float = 640.0
+    rebound: float = 1.0
+    friction_n: float = 0.0
+
+    def dampers(self) -> Array:
+        """Of front and rear (2,) [N s/m]."""
+        return np.array([4 * np.pi * damping * bounce * carried * self.mass_kg for carried, (bounce, damping, *_) in (
+            (1 - self.rear_share, self.front), (self.rear_share, self.rear))])
+
+    def further_force(self, rates_mps: Array) -> Array:
+        """Of each suspension (2, t) [N] at its rates, beside those of springs and dampers."""
+        uneven = (self.rebound - 1) / (self.rebound + 1) * self.dampers()[:, None] * np.abs(rates_mps)
+        return np.asarray(uneven + self.friction_n * np.tanh(rates_mps / SLIDES_MPS))
 
     def response(self, f_hz: Array) -> Array:
         """Acceleration of the sensor per elevation under each axle (f, 2) [1/s2]."""
+        return self.responses(f_hz, 0.0)[0][:, :2]
+
+    def responses(self, f_hz: Array, more: float) -> tuple[Array, Array]:
+        """Acceleration of the sensor (f, 4) and rates of both suspensions (f, 2, 4) per elevation under each axle and
+        force of each suspension, with dampers that are stiffer by ``more`` [N s/m]."""
         a, b = self.wheelbase_m * self.rear_share, self.wheelbase_m * (1 - self.rear_share)
-        springs, dampers, tires, wheels = [], [], [], []
-        for carried, (bounce, damping, hop, ratio) in ((1 - self.rear_share, self.front), (self.rear_share, self.rear)):
+        springs, tires, wheels = [], [], []
+        for carried, (bounce, _, hop, ratio) in ((1 - self.rear_share, self.front), (self.rear_share, self.rear)):
             mass = carried * self.mass_kg
             springs.append(mass * (2 * np.pi * bounce) ** 2)
-            dampers.append(2 * damping * 2 * np.pi * bounce * mass)
             wheels.append(ratio * mass)
             tires.append(ratio * mass * (2 * np.pi * hop) ** 2 - springs[-1])
         inertia = self.dynamic_index * self.mass_kg * a * b
         mass_matrix = np.diag([self.mass_kg, inertia, *wheels])
         rows = np.array([[1, a, -1, 0], [1, -b, 0, -1]])
         stiffness = sum(k * np.outer(row, row) for k, row in zip(springs, rows, strict=True))
-        damping_matrix = sum(c * np.outer(row, row) for c, row in zip(dampers, rows, strict=True))
+        damping_matrix = sum(c * np.outer(row, row) for c, row in zip(self.dampers() + more, rows, strict=True))
         stiffness = stiffness + np.diag([0, 0, *tires])
         s = 2j * np.pi * np.maximum(f_hz, 1e-9)[:, None, None]
-        road = np.zeros((4, 2), complex)
-        road[2, 0], road[3, 1] = tires
+        given = np.zeros((4, 4), complex)
+        given[2, 0], given[3, 1] = tires
+        given[:, 2:] = -rows.T
         moved = np.linalg.solve(s * s * mass_matrix + s * damping_matrix + stiffness, np.broadcast_to(
-            road, (len(f_hz), 4, 2)))
-        return np.asarray(s[:, :, 0] ** 2 * (moved[:, 0] + self.ahead_m * moved[:, 1]))
+            given, (len(f_hz), 4, 4)))
+        return np.asarray(s[:, :, 0] ** 2 * (moved[:, 0] + self.ahead_m * moved[:, 1])), s * (rows @ moved)
+
+    def felt(self, heights_m: Array, rate_hz: float, passed: Array) -> Array:
+        """Acceleration of the sensor (t,) over elevations (2, t) under the axles that go on from their end to their
+        beginning; ``passed``: the recorder's gain at their frequencies."""
+        count = heights_m.shape[1]
+        f_hz = np.fft.rfftfreq(count, 1 / rate_hz)
+        stiffest = self.friction_n / SLIDES_MPS / 2
+        sensor, rates = self.responses(f_hz, stiffest)
+        given = np.concatenate([np.fft.rfft(heights_m), np.zeros((2, len(f_hz)))])
+        while self.friction_n or self.rebound != 1:
+            rate = np.fft.irfft(np.einsum("fij,jf->if", rates, given), count)
+            force = np.fft.rfft(self.further_force(rate) - stiffest * rate)
+            moved, given[2:] = np.abs(force - given[2:]).max(), force
+            if moved < 1e-3 * np.abs(force).max():
+                break
+        return np.fft.irfft((sensor * given.T).sum(axis=1) * passed, count)
 
 
 def changing_road(rng: np.random.Generator, length_m: float, iri: float, waviness: float, holes_per_km: float) -> Array:
@@ -129,15 +168,10 @@ def driven(car: UnmeasuredCar, rng: np.random.Generator, seconds: float, mps: fl
         return np.asarray((ends[0] - ends[1]) / car.patch_m)
 
     count = len(place_m)
-    f_hz = np.fft.rfftfreq(count + PAD, 1 / (RATE_HZ * FINE))
-    fade = np.clip((f_hz / RATE_HZ - 0.38) / 0.12, 0, 1)
-    gains = car.response(f_hz) * (np.cos(fade * np.pi / 2) ** 2)[:, None]
-    felt = 0.0
-    for axle, behind_m in enumerate((0.0, car.wheelbase_m)):
-        height = under(place_m - behind_m)
-        ended = np.concatenate([height, np.linspace(height[-1], height[0], PAD)])
-        felt = felt + gains[:, axle] * np.fft.rfft(ended)
-    accel = np.fft.irfft(felt, count + PAD)[:count:FINE]
+    heights = np.array([under(place_m - behind_m) for behind_m in (0.0, car.wheelbase_m)])
+    ended = np.concatenate([heights, np.linspace(heights[:, -1], heights[:, 0], PAD, axis=1)], axis=1)
+    fade = np.clip((np.fft.rfftfreq(count + PAD, 1 / FINE) - 0.38) / 0.12, 0, 1)
+    accel = car.felt(ended, RATE_HZ * FINE, np.cos(fade * np.pi / 2) ** 2)[:count:FINE]
     accel = accel + recorder.noise_mps2 * rng.standard_normal(len(accel))
     if recorder.step_mps2:
         accel = np.round((accel + rng.uniform(0, recorder.step_mps2)) / recorder.step_mps2) * recorder.step_mps2
