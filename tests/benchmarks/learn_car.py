@@ -45,7 +45,8 @@ from ..support.drives.unmeasured_car import BMA220, FINE_SENSOR, MPH, Unmeasured
 from .figures import Figures
 
 SPEEDS_MPH = (10, 20, 30, 40, 50, 60, 70)
-MISSING: dict[str, dict[str, float]] = {"none": {}, "friction": {"friction_n": 60.0}, "rebound": {"rebound": 2.0}}
+MISSING = {"none": (1.0, 0.0), "friction": (1.0, 60.0), "rebound": (2.0, 0.0)}
+"""Damping in rebound over that in compression, and friction [N]."""
 AHEAD_M, WHEELBASE_OFF = 0.3, 0.01
 LEVEL = 3e-6  # Gd(0.2 cycle/m) [m3]: IRI 2 m/km
 
@@ -126,7 +127,8 @@ def main() -> int:
     noise = 2 * (recorder.noise_mps2**2 + recorder.step_mps2**2 / 12) / 100
     ours, stated, least, theirs, deviations, spent = [], [], [], [], [], []
     for seed in range(int(low), int(high or low) + 1):
-        car = replace(some_car(seed), ahead_m=AHEAD_M, **MISSING[asked.missing])
+        rebound, friction_n = MISSING[asked.missing]
+        car = replace(some_car(seed), ahead_m=AHEAD_M, rebound=rebound, friction_n=friction_n)
         wheelbase_m = car.wheelbase_m * (1 + WHEELBASE_OFF * (-1) ** seed)
         speeds = {"speeds_mps": (0.0,)} if asked.town else {}
         parts = 1 if asked.town else 4
