@@ -201,17 +201,16 @@ def _fit_with_effects(posterior: Posterior, before: LinearModel, refitted: tuple
                                            key=lambda one: one.score)
 
 
-def _best_trial(posterior: Posterior, near: State, nominal: tuple[Chosen, ...], improved: int = 3,
-                rounds: int = 6) -> State | None:
+def _best_trial(posterior: Posterior, near: State, nominal: tuple[Chosen, ...]) -> State | None:
     """On rigs, whose numbers are known less, where squares are least from sizes of the last effect that a search begins
-    at, the best so many of them improved; None on roads."""
+    at, the best three of them improved; None on roads."""
     if not are_on_rig(posterior.runs.runs):
         return None
     by_squares, one = BySquares.of(posterior), nominal[-1]
     cars = (near.logs, posterior.prior.logs(posterior.vehicle, posterior.start_vehicle))
     trials = [trial for values in one.effect.trials() if (trial := chosen(one.effect, values)).is_plain is one.is_plain]
     begun = [by_squares.at((*nominal[:-1], trial), logs, near) for trial in trials for logs in cars]
-    best = sorted((there for there in begun if there is not None), key=lambda there: there[0])[:improved]
-    ends = [by_squares.improved(state, rounds) for _, state in best]
+    best = sorted((there for there in begun if there is not None), key=lambda there: there[0])[:3]
+    ends = [by_squares.improved(state, 6) for _, state in best]
     return by_squares.of_all(min(ends, key=lambda end: end[0])[1], near) if ends else None
 

@@ -280,7 +280,7 @@ class UnmeasuredRoad:
 
     def _candidate(self, base: RoadModel, there: SameRoadFit, score: float, nodes: int) -> RoadCandidate:
         """A fit with one more effect than a model."""
-        gain = there.problem.gain(base.state, there.state, nodes) - self._cost(base, there.state.effects[-1])
+        gain = there.problem.gain(base.state, there.state, nodes=nodes) - self._cost(base, there.state.effects[-1])
         return RoadCandidate(RoadModel(there, base.score - gain), score - base.score + gain)
 
 
@@ -362,12 +362,9 @@ def _candidate(one: RoadCandidate, count: int) -> SharedRoadCandidate:
                                stands_in=not model.problem.is_linear([one.chosen], model.state.logs))
 
 
-def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequence[Chosen],
-               no_change: float = 1e-3) -> dict[str, str]:
-    """Effects that cannot be tried, and why.
-
-    no_change    of a response, as a share: no more than its table is right to
-    """
+def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequence[Chosen]
+               ) -> dict[str, str]:
+    """Effects that cannot be tried, and why."""
     found, nominal = {}, problem.response(present, problem.start_vehicle)
     for name, effect in effects.items():
         why = effect.obstacle(problem.vehicle, True)
@@ -385,7 +382,7 @@ def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequen
             try:
                 there = problem.response((*present, chosen(effect, effect.usual)), problem.start_vehicle)
                 off = np.abs(there - nominal).max() / np.abs(nominal).max()
-                if isinstance(effect, ForceEffect) and off <= no_change:
+                if isinstance(effect, ForceEffect) and off <= 1e-3:  # a table of a response is right to that
                     why = "only a measured road shows motion that is not proportional to the road"
             except ValueError:
                 why = "what cannot be linearised takes a measured road"

@@ -42,12 +42,10 @@ class SameRoadFit:
     problem: SameRoad
 
 
-def fit(problem: SameRoad, state: RoadFitState, steps: int = 10, close: float = 0.3,
-        many_rounds: int = 8) -> SameRoadFit:
+def fit(problem: SameRoad, state: RoadFitState, steps: int = 10, close: float = 0.3) -> SameRoadFit:
     """Fit the most probable state, by so many scoring steps from a state at most.
 
-    close          standard errors from the end that are near enough
-    many_rounds    equations that take more iterations get a new preconditioner, which takes about as long as they
+    close    standard errors from the end that are near enough
     """
     free_parameters = free_parameters_of(state.effects)
     p, q = len(state.logs), len(free_parameters)
@@ -64,7 +62,7 @@ def fit(problem: SameRoad, state: RoadFitState, steps: int = 10, close: float = 
         nonlocal problem, rounds
         logs, effects, roads = at(x)
         gains, slopes = response_and_slopes(problem, effects, free_parameters, logs)
-        if rounds > many_rounds:
+        if rounds > 8:  # a new preconditioner takes about as long
             problem = problem.preconditioned(RoadFitState(effects, logs, roads, gains))
         found = problem.score(problem.tables(gains, slopes), roads, information, probes)
         rounds = found.rounds
@@ -91,10 +89,10 @@ def response_and_slopes(problem: SameRoad, effects: tuple[Chosen, ...], free_par
     return gains, np.array(slopes).reshape(len(slopes), *gains.shape)
 
 
-def _limits(effects: Sequence[Chosen], free_parameters: Sequence[FreeParameter], count: int, first: int,
-            longest_log: float = 0.5) -> tuple[Array, Array, Array]:
+def _limits(effects: Sequence[Chosen], free_parameters: Sequence[FreeParameter], count: int, first: int
+            ) -> tuple[Array, Array, Array]:
     """Bounds and longest step of each number (count,); those of the free parameters begin at ``first``."""
-    low, high, longest = np.full(count, -np.inf), np.full(count, np.inf), np.full(count, longest_log)
+    low, high, longest = np.full(count, -np.inf), np.full(count, np.inf), np.full(count, 0.5)
     for index, free in enumerate(free_parameters, first):
         parameter = effects[free.effect].effect.parameters[free.parameter]
         low[index], high[index] = ends_of(parameter)
@@ -146,16 +144,15 @@ def screen(problem: SameRoad, base: SameRoadFit, ones: Sequence[Chosen]) -> list
     return found
 
 
-def _trial(one: Chosen, slope: float, remaining: float, alone: float, share: float, weakest: float = 0.03,
-           strongest: float = 3.0) -> TrialOnRoad:
-    """The trial at its best strength by its score and its information, within these bounds.
+def _trial(one: Chosen, slope: float, remaining: float, alone: float, share: float) -> TrialOnRoad:
+    """The trial at its best strength by its score and its information, as far as a quadratic is to be believed.
 
     remaining, alone    its information with all free numbers projected out, and before; a share below 1e-4 is mostly
                         rounding
     """
     if not remaining > 1e-4 * alone:
         return TrialOnRoad(one, 0.0, one, 0.0, share)
-    strength = float(np.clip(slope / remaining, weakest, strongest))
+    strength = float(np.clip(slope / remaining, 0.03, 3.0))
     scaled = scale_strength(one, strength)
     if scaled is None:
         strength, scaled = 1.0, one

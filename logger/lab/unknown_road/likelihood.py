@@ -88,13 +88,13 @@ class DriveConditions:
     waviness: float
 
 
-def responses_of(car: Car, rate_hz: float, motions: Sequence[DriveConditions], highest_cpm: float = 4.0,
-                 waves: int = 80) -> Complex:
+def responses_of(car: Car, rate_hz: float, motions: Sequence[DriveConditions], highest_cpm: float = 4.0
+                 ) -> Complex:
     """Readings as ``response_of`` for each of some motions (d, x, f): of the linear car that comes nearest to one that
     is not linear, the same for all of one that is.
 
-    highest_cpm, waves    a suspension is moved by so many waves of the road, from those below which its spectrum is
-                          flat to those as short as a tire's contact
+    highest_cpm    a suspension is moved by waves of the road from those below which its spectrum is flat to those as
+                   short as a tire's contact
 
     ValueError for effects on the record in time, and for laws that are others at another place or time.
     """
@@ -104,7 +104,7 @@ def responses_of(car: Car, rate_hz: float, motions: Sequence[DriveConditions], h
         raise ValueError("expected a car whose record is what its sensor felt")
     known_car(car)  # refuses laws that no linear ones stand in for
     output = Output(car.row, np.zeros(len(car.structure.wheels)), 2)
-    moving_cpm = np.geomspace(FLATTENED_BELOW_CPM, highest_cpm, waves)
+    moving_cpm = np.geomspace(FLATTENED_BELOW_CPM, highest_cpm, 80)
     found = []
     for motion in motions:
         psd_m3 = displacement_psd_m3(motion.level, motion.waviness, np.append(0.0, moving_cpm))[1:]
@@ -272,15 +272,12 @@ class SameRoad:
         for index, (road, parts) in enumerate(zip(roads.roads, self.stretches, strict=True)):
             yield road, roads.state(index, np.zeros(0), numbers), [run for run, _ in parts]
 
-    def prior_terms(self, logs: Array, free_parameters: int, roads: Array, waviness_off: float = 0.3,
-                    place_off_m: float = 0.05) -> tuple[Array, Array]:
+    def prior_terms(self, logs: Array, free_parameters: int, roads: Array) -> tuple[Array, Array]:
         """Deviations of a state's numbers from the means of their priors (m,), and the prior precisions (m,): of the
-        car's, of so many free parameters of effects, which have none, and of the roads'.
-
-        waviness_off, place_off_m    prior standard deviations of a stretch's waviness, and of its places from those of
-                                     the whole way (judgements)
+        car's, of so many free parameters of effects, which have none, and of the roads': of a stretch's waviness, and
+        of its places from those of the whole way [m] (judgements).
         """
-        known = [(self._roads.are(what), off) for what, off in ((WAVINESS, waviness_off), (OFFSET, place_off_m))]
+        known = [(self._roads.are(what), off) for what, off in ((WAVINESS, 0.3), (OFFSET, 0.05))]
         off = sum(which * (roads - self._first) for which, _ in known)
         free = np.zeros(free_parameters)
         return np.concatenate([logs, free, off]), np.concatenate([
@@ -384,8 +381,8 @@ def _error(drives: Sequence[tuple[int, Array, Array]]) -> float:
     return normalised_rms([read - expected for _, read, expected in drives], [read for _, read, _ in drives])
 
 
-def _cut(runs: Sequence[Run], least_s: float, stretch_s: float = 10.0) -> list[list[tuple[int, RoadDrive]]]:
-    """Stretches of the way, of about ``stretch_s``, that at least two runs share, each for ``least_s`` or longer: the
+def _cut(runs: Sequence[Run], least_s: float) -> list[list[tuple[int, RoadDrive]]]:
+    """Stretches of the way, of about 10 s, that at least two runs share, each for ``least_s`` or longer: the
     numbers of the runs of each, and their drives."""
     ways = [np.maximum.accumulate(run.distance_m) for run in runs]
     begins, ends = (sorted(way[place] for way, place in zip(ways, places, strict=True))
@@ -394,7 +391,7 @@ def _cut(runs: Sequence[Run], least_s: float, stretch_s: float = 10.0) -> list[l
     if len(runs) < 2 or not high > low:
         return []
     pace = float(np.median([np.median(run.speed_mps) for run in runs]))
-    edges = np.linspace(low, high, max(1, round((high - low) / max(pace, 1e-3) / stretch_s)) + 1)
+    edges = np.linspace(low, high, max(1, round((high - low) / max(pace, 1e-3) / 10.0)) + 1)
     found = []
     for start, end in pairwise(edges):
         parts = []

@@ -105,11 +105,10 @@ def _road_agreements(problem: SameRoad, state: RoadFitState) -> list[RoadAgreeme
     return [_road_agreement(run, by, pairs, problem.rate_hz) for (run, by), pairs in parts.items()]
 
 
-def _road_agreement(run: int, by: int, pairs: Sequence[tuple[Array, Array]], rate_hz: float, near_s: float = 0.05,
-              far_s: float = 1.0) -> RoadAgreement:
-    """The agreement of what was read and predicted (n,) over each stretch: the largest correlation within ``near_s``,
-    as places may be a little off, over the r.m.s. correlation beyond ``far_s``."""
-    near = round(near_s * rate_hz)
+def _road_agreement(run: int, by: int, pairs: Sequence[tuple[Array, Array]], rate_hz: float) -> RoadAgreement:
+    """The agreement of what was read and predicted (n,) over each stretch: the largest correlation within 0.05 s, as
+    places may be a little off, over the r.m.s. correlation beyond a second."""
+    near = round(0.05 * rate_hz)
     correlation, chance, expected = np.zeros(2 * near + 1), 0.0, 0.0
     for read, predicted in pairs:
         ours, theirs = _spectrally_flat(read, predicted, rate_hz)
@@ -117,7 +116,7 @@ def _road_agreement(run: int, by: int, pairs: Sequence[tuple[Array, Array]], rat
         share = min(1.0, float(np.linalg.norm(theirs)) / size) if size > 0 else 0.0
         ours, theirs = (_envelope_flat(one, rate_hz) for one in (ours, theirs))
         both = np.fft.irfft(np.fft.rfft(ours) * np.conj(np.fft.rfft(theirs)), len(ours))  # one for each shift
-        far = min(round(far_s * rate_hz), len(both) // 4)
+        far = min(round(rate_hz), len(both) // 4)
         chance += float((both[far:-far] ** 2).mean())
         correlation += both[np.arange(-near, near + 1)]
         expected += share * float(np.linalg.norm(ours) * np.linalg.norm(theirs))
@@ -127,8 +126,7 @@ def _road_agreement(run: int, by: int, pairs: Sequence[tuple[Array, Array]], rat
     return RoadAgreement(run, by, float(correlation.max()) / deviation, expected / deviation)
 
 
-def _spectrally_flat(read: Array, predicted: Array, rate_hz: float, lowest_hz: float = 0.5,
-          width_hz: float = 1.5) -> tuple[Array, Array]:
+def _spectrally_flat(read: Array, predicted: Array, rate_hz: float) -> tuple[Array, Array]:
     """What was read and what was predicted (n,), tapered by a tenth at each end, both divided by the smoothed spectrum
     of what was read, at the frequencies that the recorder passes."""
     n = len(read)
@@ -136,15 +134,16 @@ def _spectrally_flat(read: Array, predicted: Array, rate_hz: float, lowest_hz: f
     taper = np.sin(0.5 * np.pi * np.minimum(ends, 1.0)) ** 2
     ours, theirs = (np.fft.rfft(taper * (one - one.mean())) for one in (read, predicted))
     f_hz = np.fft.rfftfreq(n, 1 / rate_hz)
-    power = _smooth(np.abs(ours) ** 2, round(width_hz * n / rate_hz))
-    used = (f_hz >= lowest_hz) & (f_hz <= PASS_OF_RATE * rate_hz) & (power > 0)
+    power = _smooth(np.abs(ours) ** 2, round(1.5 * n / rate_hz))
+    used = (f_hz >= 0.5) & (f_hz <= PASS_OF_RATE * rate_hz) & (power > 0)
     gain = np.where(used, 1 / np.sqrt(np.where(used, power, 1.0)), 0.0)
     return np.fft.irfft(gain * ours, n), np.fft.irfft(gain * theirs, n)
 
 
-def _envelope_flat(samples: Array, rate_hz: float, width_s: float = 0.5) -> Array:
-    """Samples (n,) over their envelope: two roads with a bump at about one place are two roads all the same."""
-    envelope = np.sqrt(_smooth(samples**2, round(width_s * rate_hz)))
+def _envelope_flat(samples: Array, rate_hz: float) -> Array:
+    """Samples (n,) over their envelope, the r.m.s. of half a second: two roads with a bump at about one place are
+    two roads all the same."""
+    envelope = np.sqrt(_smooth(samples**2, round(0.5 * rate_hz)))
     return np.asarray(samples / np.maximum(envelope, 1e-300))
 
 
@@ -156,12 +155,11 @@ def _smooth(power: Array, width: int) -> Array:
 
 
 def placed_by_road(runs: Sequence[Run], vehicle: Vehicle, tolerance: Tolerance, present: Sequence[Chosen] = (),
-                   start_vehicle: Vehicle | None = None, rounds: int = 8, small_m: float = 0.01) -> list[Run]:
+                   start_vehicle: Vehicle | None = None, rounds: int = 8) -> list[Run]:
     """Runs with the distances at which the others agree with them, but for a constant of some metres, which is a number
     of the road (``RoadFitState.roads``). The first stays where it is; where windows do not correlate, so does the run.
 
-    rounds     so many at most
-    small_m    lags of this r.m.s. are no larger than their errors: a fiftieth of the shortest wave that a car feels
+    rounds    so many at most
 
     NotOneRoad, ValueError as ``SameRoad`` and its ``start``.
     """
@@ -171,7 +169,8 @@ def placed_by_road(runs: Sequence[Run], vehicle: Vehicle, tolerance: Tolerance, 
         offsets_m = _offsets(problem, present)
         found = [replace(run, distance_m=run.distance_m + off_m)
                  for run, off_m in zip(found, offsets_m, strict=True)]
-        if np.sqrt(np.mean(np.concatenate(offsets_m[1:]) ** 2)) < small_m:
+        # A fiftieth of the shortest wave that a car feels: no larger than the errors of lags.
+        if np.sqrt(np.mean(np.concatenate(offsets_m[1:]) ** 2)) < 0.01:
             break
     return found
 
