@@ -160,8 +160,7 @@ NOTHING = "nothing is missing, so there is no law to learn"
 def words(law: Law, addition: AddedEffects) -> str:
     """What it is: "friction with memory, 161 ± 4 N over 4.0 ± 0.2 mm, front axle only"."""
     one = law_learned(law, addition)
-    said = law.draft.family.words(law.draft, one, partial(_number, one))
-    return said + (f", {law.draft.axle} axle only" if law.draft.axle else "")
+    return ", ".join(filter(None, (law.draft.family.words(law.draft, one, partial(_number, one)), one.where)))
 
 
 def _number(one: Chosen, name: str, factor: float = 1.0, unit: str | None = None) -> str:
@@ -232,8 +231,8 @@ def sentences(law: Law, addition: AddedEffects) -> list[str]:
                  f"evidence: {law.listed:.0f} of {law.with_law:.0f}).")
     lines += _nearest(law.nearest, law)
     if law.rivals:
-        others = [f"{one.draft.title}: {one.draft.family.shown_by}" for one in law.rivals]
-        lines.append(f"These runs cannot distinguish it from {' or '.join(one.draft.title for one in law.rivals)}: "
+        others = [f"{one.title}: {one.shown_by}" for one in law.rivals]
+        lines.append(f"These runs cannot distinguish it from {' or '.join(one.title for one in law.rivals)}: "
                      "each explains the residual about equally well. Drives that would distinguish them: "
                      + "; ".join([f"{law.draft.title}: {law.draft.family.shown_by}", *others]) + ".")
     return lines
@@ -292,7 +291,7 @@ def as_json(found: Learning, addition: AddedEffects | None, path: str | None) ->
     one = law_learned(law, addition)
     return {
         "law": path, "family": law.draft.family.name, "words": words(law, addition), "effect": law.draft.name,
-        "axle": law.draft.axle or None, "parameters": dict(one.values),
+        "axle": one.where.partition(" ")[0] or None, "parameters": dict(one.values),
         "standard_errors": finite(one.standard_errors), "error_before": addition.error_before,
         "error_refitted": addition.error_refitted, "error_after": addition.error_after,
         "error_after_unseen": addition.error_after, "error_before_unseen": addition.error_refitted,
@@ -303,7 +302,7 @@ def as_json(found: Learning, addition: AddedEffects | None, path: str | None) ->
         "listed": {"verdict": list(found.verdict), "error_unseen": found.listed_error,
                    "gain": law.listed / 2, "gain_with_law": law.with_law / 2},
         "nearest": _nearest_json(law.nearest),
-        "confused_with": [other.draft.family.name for other in law.rivals],
+        "confused_with": [other.name for other in law.rivals],
         "steps": [{"step": name, "error": error} for name, error in steps_of(law, addition)],
         **removed_json(addition.removed),
         "sentences": sentences(law, addition),

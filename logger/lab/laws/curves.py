@@ -92,7 +92,7 @@ class CurveFamily(Family):
     def is_straight(self, draft: Draft, found: Chosen, sigma: float) -> bool:
         if draft.variant == "power":
             return super().is_straight(draft, found, sigma)
-        force_n, error_n = (np.array([some.get(one.name, np.inf) for one in draft.parameters])
+        force_n, error_n = (np.array([some.get(one, np.inf) for one in draft.strengths])
                             for some in (found.values, found.standard_errors))
         # The line through rest from which no point is off by more, if there is one.
         places = np.array(draft.places)
@@ -104,7 +104,7 @@ class CurveFamily(Family):
         if draft.variant == "power":
             return (f"a {self.force} that grows with the {motion} to the power {say('power_ratio')}, {say('force_n')} "
                     f"at {self.motion.words(draft.reference)}")
-        ends = " and ".join(f"{say(draft.parameters[place].name)} {where}" for place, where in self.ends)
+        ends = " and ".join(f"{say(draft.strengths[place])} {where}" for place, where in self.ends)
         return f"a {self.force} that follows a free curve of the {motion}, {ends}"
 
     def _power(self, reference: float, reach: float, size_n: float) -> Draft:

@@ -25,7 +25,8 @@ from logger.arrays import Array
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.runs import Run
 from logger.vehicle.compose import Response
-from logger.vehicle.effect import Chosen, Effect, Parameter, Values
+from logger.vehicle.effect import AXLE, Chosen, Effect, ForceEffect, Parameter, Sought, Values
+from logger.vehicle.laws import linear
 from logger.vehicle.vehicle import Vehicle
 
 LEARNED = "learned_"
@@ -34,7 +35,6 @@ _WIDTH = 118
 _IMPORTED = {"PchipInterpolator": "scipy.interpolate", "SimpleNamespace": "types", "hung": "logger.vehicle.structure",
              "replace": "dataclasses"}
 """What a law may use besides numpy and its class, and where it is from."""
-_AXLES = {"front": "if laws.rear:", "rear": "if not laws.rear:"}
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,6 @@ class Draft:
     shown_by     the drive that would show it best
     method       the function of its class, as its lines stand in the class without their indentation
     functions    what stands before the class: constants, and functions that the method hands on
-    axle         "front" or "rear": a force at this axle alone; "": at every wheel
     variant      distinguishes laws of one family
     at           what a picture draws its force over: "rate", "travel" or "deflection"; "loop": over the travel as it
                  goes to and fro; "": there is no picture
@@ -68,7 +67,6 @@ class Draft:
     shown_by: str
     method: str
     functions: str = ""
-    axle: str = ""
     variant: str = ""
     at: str = ""
     reference: float = 0.0
@@ -78,7 +76,12 @@ class Draft:
     @property
     def name(self) -> str:
         """Name of the effect."""
-        return "_".join([LEARNED + self.family.name, *([self.axle] if self.axle else [])])
+        return LEARNED + self.family.name
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """Names of the family and of the law in it."""
+        return self.family.name, self.variant
 
     @property
     def strengths(self) -> tuple[str, ...]:
@@ -93,9 +96,6 @@ class Draft:
         """
         parameters = self.parameters if values is None else tuple(_at(one, values[one.name]) for one in self.parameters)
         head = "\n\n".join(fill(one, _WIDTH) for one in (f"{self.title[0].upper()}{self.title[1:]}.", *said))
-        guard = f"{_AXLES[self.axle]}\n    return laws\n" if self.axle else ""
-        signature, body = self.method.strip("\n").split("\n", 1)
-        method = f"{signature}\n{indent(guard, '    ')}{body}"
         used = set(findall(r"\w+", self.functions + self.method))
         effects = sorted({self.kind, "Parameter", "Scale"} | (used & {"Between"}))
         lines = [f"from ridelog.effects import {', '.join(effects)}",
@@ -106,7 +106,8 @@ class Draft:
             f"class Learned({self.kind}):", f"    name = {self.name!r}", f"    title = {self.title!r}",
             "    parameters = (", *(indent(_written(one), " " * 8) for one in parameters), "    )",
             *(f"    {name} = (\n{_long(getattr(self, name))})" for name in ("source", "signature", "shown_by")),
-            *(f"    {one}" for one in self.words), "", indent(method, "    "), "", "", "EFFECT = Learned()", ""])
+            *(f"    {one}" for one in self.words), "", indent(self.method.strip("\n"), "    "), "", "",
+            "EFFECT = Learned()", ""])
 
     @cached_property
     def effect(self) -> Effect:
@@ -115,19 +116,13 @@ class Draft:
         exec(compile(self.text(), f"<{self.name}>", "exec"), place)
         effect: object = place["EFFECT"]
         assert isinstance(effect, Effect)
+        effect.sought = Sought.NEVER
         return effect
-
-    def of_axle(self, axle: str) -> Draft:
-        """The draft at one axle alone."""
-        return replace(self, axle=axle, title=f"{self.title}, {axle} axle only")
 
     def force_n(self, values: Mapping[str, float], at: Array, damping_n_s_per_m: float) -> Array:
         """Force of the law (n,) [N] at motions (n,) of the kind ``at`` [m, or m/s]."""
-        from logger.vehicle.effect import ForceEffect
-        from logger.vehicle.laws import linear
-
         assert isinstance(self.effect, ForceEffect)
-        before = linear(damping_n_s_per_m, self.axle == "rear")
+        before = linear(damping_n_s_per_m)
         laws = self.effect.laws(Values(**values), before)
         if self.at == "rate":
             return laws.by_rate_n(at) - before.by_rate_n(at)
@@ -138,14 +133,14 @@ class Draft:
 
 def _at(one: Parameter, value: float) -> Parameter:
     """A parameter that was found: fits begin there, and nowhere else; within bounds that leave room around it."""
-    return replace(one, start=value, trials=(value,), default=value)
+    return replace(one, start=value, trials=(value,), default=value, choices=(value,) if one.choices else ())
 
 
 def _written(one: Parameter) -> str:
     """A parameter as it stands in the file."""
     null = 'float("inf")' if one.null == np.inf else repr(one.null)
-    more = "".join(f", {name}={value!r}" for name, value in (("default", one.default), ("step", one.step))
-                   if value is not None)
+    more = "".join(f", {name}={value!r}" for name in ("default", "step", "choices", "given")
+                   if (value := getattr(one, name)) != vars(Parameter)[name])
     return (f"Parameter({one.name!r}, start={one.start!r}, low={one.low!r}, high={one.high!r}, null={null},\n"
             f"          scale=Scale.{one.scale.name}, trials={one.trials!r}{more},\n"
             f"          meaning={one.meaning!r}),")
@@ -229,6 +224,7 @@ class Family(ABC):
     kind, source, signature    of its laws, as ``Draft`` has them, unless these say something else
     shown_by           the drive that shows it best, as an instruction
     straight_at        the exponent at which its laws are straight lines, which are numbers of the car; None: at none
+    by_axle            whether its forces may act at one axle alone
     stands_out         whether its laws are loud at few frequencies and drafted only where those stand out of the noise:
                        a whole residual may be no louder than the noise for all that
     """
@@ -241,6 +237,7 @@ class Family(ABC):
     signature: str = ""
     shown_by: str
     straight_at: float | None = None
+    by_axle: bool = True
     stands_out: bool = False
 
     def __init_subclass__(cls) -> None:
@@ -255,13 +252,9 @@ class Family(ABC):
     def draft(self, parameters: tuple[Parameter, ...], method: str, functions: str = "", **more: Any) -> Draft:
         """A law of this family; ``more`` as of ``Draft``, what is not said is the family's."""
         said = {name: getattr(self, name) for name in ("kind", "title", "source", "signature", "shown_by")}
+        if more.pop("by_axle", self.by_axle) and more.get("kind", self.kind) == "ForceEffect":
+            parameters = (*parameters, AXLE)
         return Draft(family=self, parameters=parameters, method=method, functions=functions, **{**said, **more})
-
-    def narrower(self, draft: Draft, context: LawContext) -> list[Draft]:
-        """Variations of a law that promises something: a force at one axle alone."""
-        if draft.kind != "ForceEffect" or draft.axle:
-            return []
-        return [draft.of_axle(axle) for axle in context.axles]
 
     def is_straight(self, draft: Draft, found: Chosen, sigma: float) -> bool:
         """Whether a law that was found is a straight line, within so many standard errors."""

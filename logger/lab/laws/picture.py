@@ -53,7 +53,7 @@ def _band(draft: Draft, found: Chosen, errors: NumberErrors, at: Array, damping:
 def _loops(draft: Draft, found: Chosen, context: LawContext) -> Curves | None:
     """Force of a law in sinusoidal travel of small and large amplitude, at the frequency of a car's bounce."""
     assert isinstance(draft.effect, ForceEffect)
-    before = linear(context.vehicle.front.suspension_damping_n_s_per_m, draft.axle == "rear")
+    before = linear(context.vehicle.front.suspension_damping_n_s_per_m)
     laws = draft.effect.laws(SimpleNamespace(**found.values), before)
     lines = []
     for way_m in sorted({context.reach("travel_m", share) for share in _LOOP_SHARES}):

@@ -64,8 +64,8 @@ class Refusal:
     known: Nearest | None = None
 
 
-def refusal(draft: Draft, model: Baseline) -> Refusal | None:
-    """Why a law in a model that was fitted with it says nothing; None where it says something."""
+def refusal(draft: Draft, model: Baseline, without: Baseline) -> Refusal | None:
+    """Why a law in a model that was fitted with it, and without it, says nothing; None where it says something."""
     errors = standard_errors(model.linear)
     one = next(each for each in errors.effects if each.effect.name == draft.name)
     if does_nothing(one, errors.numbers):
@@ -75,6 +75,8 @@ def refusal(draft: Draft, model: Baseline) -> Refusal | None:
     if draft.family.is_straight(draft, one, SURE_SIGMA):
         return Refusal(draft.title, f"it is a straight line within {SURE_SIGMA:g} standard errors, which a parameter "
                                     "of the model already describes")
+    if model.hold_out.is_worse_than(without.hold_out):
+        return Refusal(draft.title, "the model with it predicts worse what no fit saw")
     return None
 
 

@@ -22,7 +22,7 @@ from logger.lab.selection.evidence import (
 )
 from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.lab.selection.screening import Baseline, Screened, Trial
-from logger.vehicle.effect import AXLE, Chosen, Effect
+from logger.vehicle.effect import AXLE, Chosen, Effect, Sought
 from logger.vehicle.named_parameters import free_parameters_of
 
 
@@ -61,10 +61,10 @@ class CandidateFit:
 def chance_of(effects: Sequence[Chosen], gain: float, freedom: float, candidates: int) -> float:
     """Probability, at most, that noise alone gains so much in minus twice the log of the evidence by adding such
     effects, chosen among so many, to a model of records with so many degrees of freedom. Effects that shift runs
-    compete with the distance errors, whose likelihood is no normal one: for them only the bound of the evidence
-    holds."""
+    compete with the distance errors, whose likelihood is no normal one, and among how many more a law was chosen that
+    is drafted by the records nobody knows: for them only the bound of the evidence holds."""
     bound = probability_by_chance(gain, candidates)
-    if any(one.effect.realigns for one in effects):
+    if any(one.effect.realigns or one.effect.sought is Sought.NEVER for one in effects):
         return bound
     numbers = len(free_parameters_of(effects))
     trials = candidates * prod(_shapes(one) for one in effects)
@@ -96,7 +96,7 @@ def fit_roughly(score: float, base: Baseline, screen: Screened, least: float = -
 
 def refine(score: float, one: CandidateFit, worth: float = 0.0, rounds: int = 3) -> CandidateFit:
     """Fit a candidate again with derivatives of its own."""
-    return CandidateFit.of(score, fit(one.found.linearise(), one.found.numbers, rounds, worth))
+    return CandidateFit.of(score, fit(one.found.linearise(), one.found.numbers, rounds, min_gain=worth))
 
 
 def with_refinements(now: Baseline, name: str) -> Baseline:

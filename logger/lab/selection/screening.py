@@ -16,8 +16,9 @@ from itertools import pairwise
 import numpy as np
 
 from logger.arrays import Array
+from logger.fitting.information_matrix import inverse
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import align
+from logger.lab.likelihood.map_fit import align, effect_slopes
 from logger.lab.likelihood.noise_floor import excess_over_noise, gain_of_full_explanation
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.whittle import UNEXPLAINED
@@ -174,6 +175,11 @@ class Screened:
         """The largest gain of the trials."""
         return self.trials[0].gain
 
+    def with_form(self, other: Screened) -> Screened:
+        """The trials of two forms of an effect together."""
+        first, last = sorted((self, other), key=lambda one: -one.gain)
+        return Screened(first.effect, tuple(sorted((*first.trials, *last.trials), key=lambda one: -one.gain)))
+
 
 def shared_parameters(effect: Effect, values: Mapping[str, float]) -> dict[str, float]:
     """Values of those parameters of an effect that another one has as well, clipped to their ranges: a resonance keeps
@@ -203,12 +209,15 @@ def screen(base: Baseline, effect: Effect, misaligned: Sequence[Misalignment],
         car = prior.vehicle(base.posterior.vehicle, base.state.logs)
         trials.append(trials[0] | {one.name: min(max(read(car, one.name), one.low), one.high) for one in known})
     found: dict[tuple[float, ...], dict[float, Trial]] = {}
+    strengths = [place for place, one in enumerate(effect.parameters) if one.is_free and one.null is not None]
     shape = next((one.name for one in effect.parameters if one.is_free and one.null is None), "")
 
     def try_out(values: dict[str, float]) -> None:
         one = chosen(effect, values)
         choice = (*(values[parameter.name] for parameter in effect.parameters if not parameter.is_free), one.is_plain)
-        ways = [_trial_at_values(base, one) if effect.replaces else _trial_at_best_strength(base, one)]
+        ways = [_trial_at_values(base, one) if effect.replaces else
+                _trial_at_best_strengths(base, one, strengths) if len(strengths) > 1 else
+                _trial_at_best_strength(base, one)]
         if realigns and values is not trials[0]:
             ways.append(_realigned_trial(base, one, ways[0]))
         trial = max(ways, key=lambda trial: trial.gain)
@@ -216,7 +225,8 @@ def screen(base: Baseline, effect: Effect, misaligned: Sequence[Misalignment],
         if (there := values.get(shape, 0.0)) not in by_shape or trial.gain > by_shape[there].gain:
             by_shape[there] = trial
 
-    for values in trials:
+    # At their nulls strengths have one derivative each, whatever a search begins at.
+    for values in trials[:1] if len(strengths) > 1 else trials:
         try_out(values)
     if AXLE in effect.parameters and base.posterior.vehicle.rear is not None:
         both = max((trial for by_shape in found.values() for trial in by_shape.values()), key=lambda one: one.gain)
@@ -230,16 +240,12 @@ def screen(base: Baseline, effect: Effect, misaligned: Sequence[Misalignment],
     return Screened(effect, tuple(sorted(best, key=lambda trial: -trial.gain)))
 
 
-def _delayed_trials(base: Baseline, effect: Effect, seen: Misalignment, falls: int = 3, as_good: float = 0.8,
-                    most: int = 4) -> list[Trial]:
+def _delayed_trials(base: Baseline, effect: Effect, seen: Misalignment) -> list[Trial]:
     """The best trials of an effect that delays, with the delay taken out of the distances: fitted without the effect,
     these have absorbed it, and a delay by half a wave more is beyond what is linear. On a rig, whose clock is one,
-    nothing has.
-
-    falls            after so many trials of one kind, each of which gains less than the one before, no more are tried
-    as_good, most    so many kinds at most, which gain such a share of the best, are starts of fits (judgements: a trial
-                     gains nine tenths of its fit)
-    """
+    nothing has. After three trials of one kind, each of which gains less than the one before, no more are tried. Four
+    kinds at most that gain four fifths of the best are starts of fits (judgements: a trial gains nine tenths of its
+    fit)."""
     bests = []
     timed = base.on_rig
     for kind in effect.delaying_trials(seen):
@@ -249,22 +255,21 @@ def _delayed_trials(base: Baseline, effect: Effect, seen: Misalignment, falls: i
             delay_s = 0.0 if timed else _delay_s(one)
             earlier = (chosen(TIME_OFFSET, {"delay_s": -delay_s}),) if delay_s else ()
             tried.append((_trial_at_values(base, one, earlier), delay_s))
-            last = [trial.gain for trial, _ in tried[-falls - 1 :]]
-            if len(last) > falls and all(later < before for before, later in pairwise(last)):
+            last = [trial.gain for trial, _ in tried[-4:]]
+            if len(last) > 3 and all(later < before for before, later in pairwise(last)):
                 break
         bests.append(max(tried, key=lambda pair: pair[0].gain))
     bests.sort(key=lambda pair: -pair[0].gain)
-    worth = [(trial, delay_s) for trial, delay_s in bests[:most]
-             if trial.gain > max(as_good * bests[0][0].gain, 0.0)]
+    worth = [(trial, delay_s) for trial, delay_s in bests[:4]
+             if trial.gain > max(0.8 * bests[0][0].gain, 0.0)]
     speeds = [error.coefficients_of(error.run.speed_mps) for error in base.posterior.record_errors] if worth else []
     return [_begun_earlier(base, trial, [delay_s * one for one in speeds]) for trial, delay_s in worth]
 
 
-def _delay_s(one: Chosen, slow_hz: float = 1.0) -> float:
-    """By how much an effect on the sensor delays slow motions, such as a body's bounce [s]."""
+def _delay_s(one: Chosen) -> float:
+    """By how much an effect on the sensor delays slow motions, of 1 Hz as a body's bounce [s]."""
     assert isinstance(one.effect, SensorEffect)
-    slow = np.array([2j * np.pi * slow_hz])
-    return float(-np.angle(one.effect.factor(one.p, slow)[0]) / (2 * np.pi * slow_hz))
+    return float(-np.angle(one.effect.factor(one.p, np.array([2j * np.pi]))[0]) / (2 * np.pi))
 
 
 def _begun_earlier(base: Baseline, trial: Trial, farther: Sequence[Array]) -> Trial:
@@ -321,6 +326,25 @@ def _trial_at_best_strength(base: Baseline, one: Chosen) -> Trial:
     return max(_with_predicted_gain(base, at(strength, scaled)), at(1.0, one), key=lambda trial: trial.gain)
 
 
+def _trial_at_best_strengths(base: Baseline, one: Chosen, strengths: Sequence[int]) -> Trial:
+    """The trial of an effect with several strengths, its parameters at these places, after one Gauss-Newton step of
+    these and of the car's numbers from their nulls."""
+    linear, state = base.linear, base.state
+    nulls = {each.name: each.null for each in one.effect.parameters if each.is_free and each.null is not None}
+    effects = (*state.effects, replace(one, values={**one.values, **nulls}))
+    free = [FreeParameter(len(state.effects), place) for place in strengths]
+    slopes = effect_slopes(base.posterior, effects, state.logs, free, state.record, None)
+    white, residuals = linear.whitened(slopes), linear.fit_record_errors(state.predictions).residuals
+    gradient, information = linear.gradient(residuals, state.logs, white), linear.information(white)
+    p = linear.count
+    # A point of a curve beyond all motions has no derivative, and stays at 0.
+    step = inverse(information) @ gradient
+    without = np.linalg.solve(information[:p, :p], gradient[:p]) if p else np.empty(0)
+    there = with_coordinates(effects, free, coordinates_of(effects, free) + step[p:])
+    return Trial(there[-1], float(gradient @ step - gradient[:p] @ without), state.logs + step[:p],
+                 [step[p:] @ one for one in slopes])
+
+
 def _goes_both_ways(effect: Effect) -> bool:
     """Whether an effect's first strength may have either sign."""
     first = next((one for one in effect.parameters if one.null is not None and one.is_free), None)
@@ -357,7 +381,7 @@ def _realigned_trial(base: Baseline, one: Chosen, trial: Trial) -> Trial:
     that were fitted without the effect are too."""
     posterior, state = base.posterior, base.state
     # It only decides where a fit begins: a round that gains less than 0.4 % of the whole gain is the last.
-    found = align(posterior, posterior.state_at((*state.effects, one), state.logs), 0.004)
+    found = align(posterior, posterior.state_at((*state.effects, one), state.logs), min_share=0.004)
     return replace(trial, one=one, gain=base.score - found.score, logs=state.logs, start=found.state)
 
 
@@ -382,12 +406,12 @@ def misalignment_of_record(base: Baseline) -> Misalignment:
     return Misalignment(float(1 / (1 + longer)), float(-earlier_s), *_filter_of(base.posterior))
 
 
-def misalignment(posterior: Posterior, state: State, slow_s: float = 0.2) -> Misalignment:
+def misalignment(posterior: Posterior, state: State) -> Misalignment:
     """The scale error and the delay at which all runs together correlate most with the model, each by itself. Both are
-    searched for in the slow part of the motion, whose waves are long."""
+    searched for in the slow part of the motion, over 0.2 s, whose waves are long."""
     pairs: list[tuple[Run, Array, Array]] = []
     for run, predicted in zip(posterior.runs.runs, state.predictions, strict=True):
-        size = min(max(1, round(slow_s * run.rate_hz)), run.count - 2)
+        size = min(max(1, round(0.2 * run.rate_hz)), run.count - 2)
         hat = np.hanning(size + 2)[1:-1]
         slow = [np.convolve(one, hat / hat.sum(), "same") for one in (run.measured_mps2, run.main(predicted))]
         pairs.append((run, slow[0], slow[1]))

@@ -30,7 +30,7 @@ from logger.lab.selection.evidence import INDISTINGUISHABLE
 from logger.lab.selection.screening import Baseline, Screened, Trial, effects_without
 from logger.lab.selection.stepwise import MeasuredRoad, Progress
 from logger.simulation.virtual_drive import SEARCH_HZ
-from logger.vehicle.effect import Chosen, Effect, Misalignment, chosen
+from logger.vehicle.effect import Chosen, Effect, Misalignment, Sought, chosen
 from logger.vehicle.named_parameters import WEAKEST
 
 _Drawn = tuple[float, State]
@@ -93,6 +93,8 @@ class UnknownNumbers(MeasuredRoad):
         without = by_squares.deviance(anchor)
 
         def begun(one: Screened) -> Screened:
+            if one.effect.sought is Sought.NEVER:  # drafted by the motions of the records, as it begins
+                return one
             drawn = self._cars(by_squares, one.effect, anchor, one.trials)
             if not (ends := _improved(by_squares, [some[0] for some in drawn if some], 4)):
                 return one

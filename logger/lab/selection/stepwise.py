@@ -22,7 +22,7 @@ from logger.lab.likelihood.noise_floor import is_within_discrepancy
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.residuals.noise_colour import is_coloured_noise
 from logger.lab.selection.candidate_fit import CandidateFit, chance_of, fit_roughly, refine, with_refinements
-from logger.lab.selection.evidence import FALSE_ALARM, IMITATION, INDISTINGUISHABLE, min_gain, probability_by_chance
+from logger.lab.selection.evidence import FALSE_ALARM, IMITATION, INDISTINGUISHABLE, min_gain
 from logger.lab.selection.holdout import HoldOut
 from logger.lab.selection.screening import (
     Baseline,
@@ -164,15 +164,17 @@ class MeasuredRoad:
 
     def screened(self, base: Baseline, effects: Sequence[Effect], seen: Misalignment, near: Chosen | None,
                  pool: ThreadPoolExecutor, progress: Progress) -> list[Screened]:
-        """Effects screened by simulations at their trial values."""
+        """Effects screened by simulations at their trial values; those of one name are forms of one."""
         misaligned = [seen]
         if base.state.size.is_unusually_large:
             misaligned.append(misalignment_of_record(base))
-        found = []
+        found: dict[str, Screened] = {}
         for done, one in enumerate(pool.map(lambda effect: screen(base, effect, misaligned, near), effects), 1):
             progress(f"screened {done} of {len(effects)} effects")
-            found += [one] if one.trials else []
-        return sorted(found, key=lambda one: -one.gain)
+            if one.trials:
+                name = one.effect.name
+                found[name] = one.with_form(found[name]) if name in found else one
+        return sorted(found.values(), key=lambda one: -one.gain)
 
     def laid_anew(self, base: Baseline) -> Baseline | None:
         """The model with the recorded distances, where its distance errors are large."""
@@ -198,7 +200,7 @@ class MeasuredRoad:
 
     def refined(self, base: Baseline, one: CandidateFit, least: float) -> CandidateFit:
         """The fit with derivatives of its own."""
-        return refine(base.score, one, least)
+        return refine(base.score, one, worth=least)
 
     def with_effect(self, one: CandidateFit) -> Baseline:
         """The model with the effect, its runs aligned again."""
@@ -282,11 +284,6 @@ class Search(Generic[M, P, F]):
     _promising: set[str] = field(default_factory=set)
     _rivals: dict[str, tuple[str, ...]] = field(default_factory=dict)
     _reduced: tuple[M, dict[str, M]] | None = None
-
-    def with_more_given(self, more: int, effects: int) -> Search[M, P, F]:
-        """A search of its own for up to so many effects, on models in which so many more are given."""
-        return Search(self.effects, self.present + more, self.misalignment, self.progress, self.workers,
-                      replace(self.effort, effects=effects), self.likelihood)
 
     def best_of(self, effect: Effect, base: M, values: Mapping[str, float]) -> F:
         """The best fit of one effect on a model, with these of its choices, whatever it gains."""
@@ -417,14 +414,15 @@ class Search(Generic[M, P, F]):
         Fits are dear. One is made as long as its effect may still gain what has to be gained: more than chance does, or
         the effect in whose place it is tried, and then what the best fit that may be taken has gained. On a model that
         has none yet the best fit so far may be of an imitation, and the right effect far from where it was screened:
-        there all that gain more than chance are fitted.
+        there all that gain more than chance are fitted, unless it is said what has to be gained.
 
         instead_of    the effect in whose place they are tried; None: in addition
         base          the model on which they are screened; None: this one
-        to_gain       gain of that effect; None: what chance may gain
+        to_gain       gain of that effect, or of what else is to be outdone; None: what chance may gain
         beside        a round of others on the same model, which is a part of this one
         """
         effort, base = self.effort, now if base is None else base
+        may_prune = to_gain is not None or len(names_of(now)) > self.present
         to_gain = min_gain(len(self.effects)) if to_gain is None else to_gain
         lost = base.score - now.score
         with ThreadPoolExecutor(self.workers) as pool:
@@ -436,7 +434,7 @@ class Search(Generic[M, P, F]):
                 worth += self._may_win(there, self._screen_all(pool, there, aligning), effort.fit_share * to_gain)
             self.progress(f"fitting {len(worth)} of them")
             tries = self._fit_all_roughly(pool, now.score, worth[:1], 0.0)
-            if instead_of is not None or len(names_of(now)) > self.present:
+            if may_prune:
                 to_gain = max(to_gain, self._reached(now, [*tries, *beside.fits]))
             enough = effort.fit_share * to_gain
             tries += self._fit_all_roughly(pool, now.score, [
@@ -517,10 +515,7 @@ class Search(Generic[M, P, F]):
         return self.likelihood.leaves_noise(there) or self.likelihood.explains_most(without, there)
 
     def _chance_of(self, without: M, one: Chosen, gain: float) -> float:
-        """Probability, at most, that noise alone gains so much over a model. Of what is not among the effects that are
-        searched, a law that was learned, nobody knows how much else was tried: the bound of the evidence holds."""
-        if all(known is not one.effect for known in self.effects):
-            return probability_by_chance(gain, len(self.effects))
+        """Probability, at most, that noise alone gains so much over a model."""
         return self.likelihood.chance(one, gain, without, len(self.effects))
 
     def _required_gain(self, without: M) -> float:

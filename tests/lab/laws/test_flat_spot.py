@@ -34,7 +34,7 @@ def anywhere() -> Draft:
 
 
 def drafted(context: LawContext, axle: str) -> Draft:
-    return next(one for one in FAMILY.drafts(context) if one.axle == axle and one.variant == "spot")
+    return next(one for one in FAMILY.drafts(context) if one.variant == f"spot_{axle}")
 
 
 @pytest.mark.slow

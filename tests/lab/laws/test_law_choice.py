@@ -1,125 +1,152 @@
-"""Which of the laws that were fitted is chosen, and in what order they are tried; fits and refusals are made up."""
+"""Which of the laws that were sought is chosen, and in what order they are tried, on a likelihood that is made up."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
 from logger.lab.laws import learn
-from logger.lab.laws.learn import LawFit, _LawChoice
-from logger.lab.laws.refusals import Nearest, Refusal
+from logger.lab.laws.draft import LEARNED
+from logger.lab.laws.learn import DECISIVE, LawSearch
+from logger.lab.laws.refusals import Refusal
+from logger.lab.selection.stepwise import Search, SearchEffort
+from logger.vehicle.effect import ForceEffect, Misalignment, chosen
+from logger.vehicle.laws import CornerLaws
 
-BEFORE, NOW = (SimpleNamespace(score=score, above=True, state=SimpleNamespace(names=names, effects=names))
-               for score, names in ((1000.0, ()), (700.0, ("known",))))
+from ..selection.test_any_likelihood import Made, MadeUp
+
+Worth = Mapping[str, Mapping[str, float]]
+"""What each law and known effect explains of each cause; of two that explain one the better one counts."""
 
 
-@dataclass
+class NamedEffect(ForceEffect):
+    """An effect that is a name."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def laws(self, p: SimpleNamespace, laws: CornerLaws) -> CornerLaws:
+        return laws
+
+
 class World:
-    """What comes of laws that are fitted to the end, by name.
+    """The models of some laws and known effects, by what each explains of which cause.
 
-    score       of the model with the law alone, and with known effects on top of it
-    above       laws that leave more than noise
-    dropped     laws that are not needed in the end
-    nothing     laws that say nothing
-    instead     laws in whose place a known effect explains more
+    nothing    laws that say nothing
+    related    known effects that no search tries unasked, which all laws may nearly be
+    noise      what a model may leave and is no louder than the noise
+    tried      laws that were fitted to the end
     """
 
-    score: Mapping[str, float] = field(default_factory=dict)
-    on_top: Mapping[str, float] = field(default_factory=dict)
-    above: frozenset[str] = frozenset()
-    dropped: frozenset[str] = frozenset()
-    nothing: frozenset[str] = frozenset()
-    instead: frozenset[str] = frozenset()
-    tried: list[str] = field(default_factory=list)
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, worth: Worth, known: Sequence[str] = (), nothing: str = "",
+                 related: Sequence[str] = (), noise: float = 0.0) -> None:
+        all_of_it = sum(max(some.get(cause, 0.0) for some in worth.values())
+                        for cause in {cause for some in worth.values() for cause in some})
+        self.tried: list[str] = []
+        laws = [name for name in worth if name not in {*known, *related}]
 
+        @dataclass(frozen=True)
+        class Model(Made):
+            posterior: Any = None
 
-def law(name: str, score: float, base: Any = BEFORE) -> LawFit:
-    """A law that was fitted."""
-    family: Any = SimpleNamespace(name=name, title=name)
-    draft = SimpleNamespace(name=name, variant="", parameters=(), title=name, family=family)
-    fit: Any = SimpleNamespace(found=SimpleNamespace(score=score), gain=base.score - score)
-    return LawFit(draft, base, fit)  # type: ignore[arg-type]
+            @property
+            def score(self) -> float:
+                there = [worth[one.effect.name.removeprefix(LEARNED)] for one in self.effects]
+                return -sum(max(some.get(cause, 0.0) for some in there)
+                            for cause in {cause for some in there for cause in some})
 
+            @property
+            def state(self) -> Any:
+                return SimpleNamespace(effects=self.effects, names=[one.effect.name for one in self.effects])
 
-def choice(world: World, monkeypatch: pytest.MonkeyPatch, *fits: LawFit) -> _LawChoice:
-    """The choice among laws that were fitted on the car alone and beside a known effect."""
-    def fit_in_full(_choice: _LawChoice, one: LawFit) -> tuple[Any, dict[str, float]]:
-        world.tried.append(one.draft.name)
-        name = one.draft.name
-        score = world.score.get(name, one.score)
-        return SimpleNamespace(score=score, above=name in world.above, law=name), (
-            {} if name in world.dropped else {name: 1000.0 - score})
+        class Likelihood(MadeUp):
+            def screened(self, base: Any, effects: Any, *how: Any) -> list[Any]:
+                return sorted((Tried(one, base) for one in effects), key=lambda each: -each.gain)
 
-    def known_on_top(_choice: _LawChoice, one: LawFit) -> None:
-        model, gains = _choice.ended[one]
-        score = world.on_top.get(one.draft.name, one.score)
-        _choice.ended[one] = SimpleNamespace(**vars(model) | {"score": score}), gains
+            def explains_most(self, without: Any, there: Any) -> bool:
+                return False
 
-    def refused(draft: Any, _model: Any) -> Refusal | None:
-        return Refusal(draft.name, "says nothing") if draft.name in world.nothing else None
+            def fitted_roughly(self, score: float, base: Any, one: Any, least: float) -> list[Any]:
+                return [one]
 
-    def nearest(_choice: _LawChoice, model: Any, _best: LawFit, gain: float) -> Nearest | None:
-        one: Any = SimpleNamespace(effect=SimpleNamespace(name="known"))
-        return Nearest(one, gain + 1, gain) if model.law in world.instead else None
+        class Tried:
+            def __init__(self, effect: Any, base: Any) -> None:
+                self.model = Model((*base.effects, chosen(effect, {})))
+                self.effect, self.chosen = effect, self.model.effects[-1]
+                self.gain = base.score - self.model.score
 
-    def chosen(_choice: _LawChoice, best: LawFit, model: Any, _gain: float, _near: Nearest | None, others: Any) -> Any:
-        return best.draft.name, model.score, [one.draft.name for one in others if one is not best]
+        def refused(draft: Any, _model: Any, _without: Any) -> Refusal | None:
+            self.tried.append(draft.title)
+            return Refusal(draft.title, "says nothing") if draft.title in nothing else None
 
-    for name, stub in {"_fit_in_full": fit_in_full, "_add_known": known_on_top, "_nearest": nearest, "_law": chosen,
-                       "_is_accepted": lambda _choice, _one: True}.items():
-        monkeypatch.setattr(_LawChoice, name, stub)
-    monkeypatch.setattr(learn, "refusal", refused)
-    monkeypatch.setattr(learn, "is_above_noise", lambda model: model.above)
-    monkeypatch.setattr(learn, "exceeds_noise", lambda model: model.above)
-    selection: Any = SimpleNamespace(before=BEFORE, now=NOW)
-    search: Any = SimpleNamespace(present=0)
-    by_base: Any = [(base, [one for one in fits if one.base is base]) for base in (BEFORE, NOW)]
-    return _LawChoice(search, selection, {}, {}, by_base)
+        def family(name: str) -> Any:
+            found = SimpleNamespace(name=name, title=name, stands_out=False, related_effects=tuple(related))
+            found.drafts = lambda _context: [SimpleNamespace(
+                effect=NamedEffect(LEARNED + name), name=LEARNED + name, key=(name, ""), title=name, family=found)]
+            return found
+
+        monkeypatch.setattr(learn, "refusal", refused)
+        monkeypatch.setattr(learn, "exceeds_noise", lambda model: model.score > noise - all_of_it)
+        effects = {name: NamedEffect(name) for name in (*known, *related)}
+        search: Any = Search([effects[name] for name in known], 0, Misalignment(1.0, 0.0), workers=1,
+                             effort=SearchEffort(effects=4), likelihood=Likelihood())
+        self.laws = LawSearch(search, search.run(Model(explains=0.0)), {name: family(name) for name in laws}, effects)
+
+    def best(self) -> tuple[str, list[str], list[str]] | None:
+        """The law that is chosen, the known effects beside it, and its rivals."""
+        found = self.laws.best()
+        return found and (found.draft.title, [one.effect.name for one in found.effects],
+                          [one.name for one in found.rivals])
 
 
 def test_a_refused_law_is_tried_on_no_other_model_and_is_no_rival(monkeypatch: pytest.MonkeyPatch) -> None:
-    world = World(nothing=frozenset("A"))
-    found = choice(world, monkeypatch, law("A", 400.0), law("A", 401.0, NOW), law("B", 500.0, NOW))
-    assert found.with_effects() == ("B", 500.0, [])
-    assert world.tried == ["A", "B"]
+    world = World(monkeypatch, {"A": {"x": 600.0}, "B": {"x": 595.0}, "known": {"y": 300.0}}, ["known"], nothing="A")
+    assert world.best() == ("B", ["known"], [])
+    assert world.tried.count("A") == 1
 
 
-def test_laws_that_were_refused_alone_are_not_tried_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    world = World(nothing=frozenset("ABC"))
-    found = choice(world, monkeypatch, *(law(name, 400.0 + 10 * n) for n, name in enumerate("ABCD")))
-    assert found.explaining_all() is None and world.tried == ["A", "B", "C"]
-    assert found.with_effects() == ("D", 430.0, [])
+def test_laws_are_tried_until_one_says_something(monkeypatch: pytest.MonkeyPatch) -> None:
+    world = World(monkeypatch, {name: {"x": 600.0 - 20 * n} for n, name in enumerate("ABCD")}, nothing="ABC")
+    assert world.best() == ("D", [], [])
+    assert world.tried == ["A", "B", "C", "D"]
 
 
 def test_a_law_that_is_not_needed_in_the_end_makes_room_for_the_next(monkeypatch: pytest.MonkeyPatch) -> None:
-    world = World(dropped=frozenset("A"))
-    found = choice(world, monkeypatch, law("A", 400.0), law("B", 415.0))
-    assert found.explaining_all() == ("B", 415.0, ["A"])
+    needed, world = Search.eliminate_backward, World(monkeypatch, {"A": {"x": 600.0}, "B": {"x": 595.0}})
+
+    def without_a(search: Search, before: Any, now: Any) -> Any:
+        return (before, {}) if now.state.names == ["learned_A"] and not search.effects else needed(search, before, now)
+
+    monkeypatch.setattr(Search, "eliminate_backward", without_a)
+    assert world.best() == ("B", [], []) and world.tried == ["B"]
 
 
-def test_alone_a_law_has_to_leave_no_more_than_noise(monkeypatch: pytest.MonkeyPatch) -> None:
-    world = World(above=frozenset("A"))
-    found = choice(world, monkeypatch, law("A", 400.0))
-    assert found.explaining_all() is None
-    assert found.with_effects() == ("A", 400.0, [])
+def test_laws_that_explain_as_well_are_rivals(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert World(monkeypatch, {"A": {"x": 600.0}, "B": {"x": 595.0}}).best() == ("A", [], ["B"])
 
 
 def test_known_effects_on_top_of_a_law_count_for_it(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Alone it explains less than the known effect, and than another law beside that."""
-    world = World(on_top={"A": 300.0}, above=frozenset("AB"))
-    found = choice(world, monkeypatch, law("A", 800.0), law("B", 350.0, NOW))
-    assert found.with_effects() == ("A", 300.0, ["B"])
+    """Alone it explains less than another law, beside which the known effect explains nothing more."""
+    worth = {"A": {"x": 400.0}, "B": {"y": 450.0}, "known": {"y": 300.0, "x": 10.0}}
+    assert World(monkeypatch, worth, ["known"]).best() == ("A", ["known"], [])
+
+
+def test_where_known_effects_explain_all_a_law_is_decisively_better_or_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    for more, named in ((-1.0, False), (1.0, True)):
+        worth = {"A": {"x": 600.0 + DECISIVE + more}, "known": {"x": 600.0}}
+        assert bool(World(monkeypatch, worth, ["known"], noise=DECISIVE + 2).best()) == named
 
 
 def test_a_known_effect_that_explains_more_is_reported_before_what_says_nothing(monkeypatch: pytest.MonkeyPatch
                                                                                ) -> None:
-    world = World(nothing=frozenset("A"), instead=frozenset("B"))
-    found = choice(world, monkeypatch, law("A", 400.0), law("B", 420.0))
-    assert found.explaining_all() is None
-    refusal = found.refusal_to_report()
+    worth = {"A": {"x": 600.0}, "B": {"x": 580.0}, "unasked": {"x": 590.0}}
+    world = World(monkeypatch, worth, nothing="A", related=["unasked"])
+    assert world.best() is None
+    refusal = world.laws.refusal_to_report()
     assert refusal is not None and refusal.title == "B" and refusal.known is not None
-    assert next(iter(found.refused.values())).title == "A"
+    assert refusal.known.one.effect.name == "unasked"
+    assert next(iter(world.laws.refused.values())).title == "A"

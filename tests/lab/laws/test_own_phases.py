@@ -11,10 +11,9 @@ from logger.lab.diagnosis import refit
 from logger.lab.laws.draft import LawContext
 from logger.lab.laws.families.hum import FAMILY as HUM
 from logger.lab.laws.families.wheel_turns import FAMILY as WHEEL_TURNS
-from logger.lab.laws.learn import screen_law
 from logger.lab.laws.repeating import EACH
 from logger.lab.selection.candidate_fit import fit_roughly, refine
-from logger.lab.selection.screening import misalignment
+from logger.lab.selection.screening import misalignment, screen
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, chosen
@@ -44,7 +43,7 @@ def test_a_hum_that_begins_elsewhere_in_each_run_is_found_with_a_pair_for_each()
     start = posterior.start()
     base = refit(posterior, start)
     drafts = [one for one in HUM.drafts(LawContext(posterior, base.state)) if one.variant.startswith("steady")]
-    alike, each = (fit_roughly(base.score, base, screen_law(base, one, misalignment(posterior, start)))[0]
+    alike, each = (fit_roughly(base.score, base, screen(base, one.effect, [misalignment(posterior, start)]))[0]
                    for one in drafts)
     assert [one.variant for one in drafts] == ["steady", f"steady{EACH}"]
     assert each.gain > alike.gain + 100

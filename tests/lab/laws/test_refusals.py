@@ -42,7 +42,7 @@ def drafts(family: Family) -> dict[str, Draft]:
 
 
 def found(draft: Draft, values: Sequence[float], errors: Sequence[float]) -> Chosen:
-    names = [one.name for one in draft.parameters]
+    names = [one.name for one in draft.parameters][: len(values)]
     return replace(chosen(draft.effect, dict(zip(names, values, strict=True))),
                    standard_errors=dict(zip(names, errors, strict=True)))
 
@@ -121,7 +121,8 @@ def test_a_fitted_law_is_refused_for_its_own_numbers(added: float, hz: float, wh
     posterior = posterior_of(secret_runs([chosen(draft.effect, values)], lasts_s=8.0))
     start = chosen(draft.effect, values | {"added_ratio": max(added, 0.01)})
     begun = posterior.state_at((start,), posterior.start().logs)
-    refused = refusal(draft, Baseline.of(fit(LinearModel(posterior, begun))))
+    plain, with_law = (Baseline.of(fit(LinearModel(posterior, one))) for one in (posterior.start(), begun))
+    refused = refusal(draft, with_law, plain)
     assert (refused.why if refused else "").find(why) >= 0 and bool(refused) == bool(why)
 
 

@@ -53,10 +53,8 @@ class DamperHeat(Family):
                         f"fall of the logarithm of {of} per absorbed energy") for name, of in losses.items()),
             Parameter("cooling_time_s", 30.0, 3.0, 600.0, None, Scale.LOG, (15.0, 100.0),
                       "time in which the loss falls to 37 %"))
-        return self.draft(parameters, _METHOD.format(lost=lost), _FUNCTIONS, variant=variant)
-
-    def narrower(self, draft: Draft, context: LawContext) -> list[Draft]:
-        return super().narrower(draft, context) if draft.variant == "alike" else []
+        return self.draft(parameters, _METHOD.format(lost=lost), _FUNCTIONS, variant=variant,
+                          by_axle=variant == "alike")
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         where = {"lost_per_j": "", "front_lost_per_j": " (front)", "rear_lost_per_j": " (rear)"}

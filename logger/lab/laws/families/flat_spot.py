@@ -9,12 +9,13 @@ knows: the spot has one place along the way in all runs, where their ways go on,
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, handed_on, rounded
 from logger.lab.laws.repeating import ALL_ALIKE, BEGINS, EACH, best_lags_m, comb_frequency, each_run, in_run, of_run
-from logger.vehicle.effect import Chosen, Parameter, Scale, chosen
+from logger.vehicle.effect import AXLE, Chosen, Parameter, Scale, chosen
 
 _FUNCTIONS = """
 def dip(p, seen):
@@ -35,6 +36,7 @@ class FlatSpot(Family):
               "(Delft, 1998)")
     signature = "short blows, once in each turn of a wheel, whatever the speed"
     shown_by = "drive a smooth road slowly, and look at the tires"
+    by_axle = False
     stands_out = True
 
     def drafts(self, context: LawContext) -> list[Draft]:
@@ -49,9 +51,6 @@ class FlatSpot(Family):
                 begun = _draft(context, axle, runs, radius_m, [0.0] * len(runs))
                 found.append(_draft(context, axle, runs, radius_m, _places_m(context, begun, len(runs))))
         return found
-
-    def narrower(self, draft: Draft, context: LawContext) -> list[Draft]:
-        return []
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         what, sign, how = (("a flat spot of a tire", 1.0, "less") if found.values["force_n"] > 0
@@ -79,9 +78,11 @@ def _draft(context: LawContext, axle: str, runs: Sequence[str], radius_m: float,
         *(Parameter(name, place_m, -turn_m, turn_m, None, Scale.LINEAR, (place_m,),
                     f"along the road, where the spot touches the ground{of_run(run)}", step=0.005)
           for name, place_m, run in zip(names, places_m, runs, strict=True)))
-    draft = FAMILY.draft(parameters, handed_on("dip", "WHEEL_AND_GROUND"), _FUNCTIONS.format(place=places),
-                         variant="spot" + EACH * (last > 0), words=("needs_road = True",))
-    return draft.of_axle(axle) if axle else draft
+    at = float(["", "front", "rear"].index(axle))
+    return FAMILY.draft((*parameters, replace(AXLE, start=at, trials=(at,), default=at, choices=(at,))),
+                        handed_on("dip", "WHEEL_AND_GROUND"), _FUNCTIONS.format(place=places),
+                        variant="_".join(filter(None, ("spot", axle))) + EACH * (last > 0),
+                        words=("needs_road = True",))
 
 
 def _places_m(context: LawContext, begun: Draft, count: int) -> list[float]:

@@ -4,17 +4,7 @@ from __future__ import annotations
 
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, handed_on
 from logger.vehicle.effect import Chosen, Parameter, Scale
-
-_FUNCTIONS = """
-def force(p, seen):
-    return p.yield_force_n * seen.memory[0]
-
-
-def rates(p, seen):
-    z = seen.memory[0]
-    held = 0.5 * np.abs(z) ** p.sharpness_ratio * (1.0 + np.sign(seen.rate_mps * z))
-    return (seen.rate_mps / p.yield_travel_m * (1.0 - held),)
-"""
+from logger.vehicle.effects import hysteresis
 
 
 class FrictionWithMemory(Family):
@@ -32,9 +22,11 @@ class FrictionWithMemory(Family):
             Parameter("yield_travel_m", 0.002, 0.0002, 0.05, None, Scale.LOG, (0.0008, 0.003, 0.01),
                       "over which the force would grow to that at its initial stiffness"),
             Parameter("sharpness_ratio", 1.0, 1.0, 1.0, None, Scale.LINEAR, (1.0,),
-                      "exponent: the higher, the sharper the yield", default=1.0))
-        return [self.draft(parameters, handed_on(states=1), _FUNCTIONS, title="friction that yields before it slides",
-                           at="loop")]
+                      "exponent: the higher, the sharper the yield", default=1.0),
+            Parameter("reversal_ratio", 1.0, 1.0, 1.0, None, Scale.LINEAR, (1.0,),
+                      "stiffness when it is let go over the initial one", default=1.0))
+        return [self.draft(parameters, handed_on(states=1), f"from {hysteresis.__name__} import force, rates",
+                           title="friction that yields before it slides", at="loop")]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         return f"friction with memory, {say('yield_force_n')} over {say('yield_travel_m', 1000.0, 'mm')}"

@@ -37,6 +37,7 @@ class WheelTurns(Family):
     source = "a mass that turns off its axis (J. P. Den Hartog, Mechanical Vibrations, 1956, section 6.1)"
     signature = "it repeats along the road, whatever the speed, and grows with the square of the speed"
     shown_by = "drive a smooth road at two steady speeds"
+    by_axle = False
     stands_out = True
 
     def drafts(self, context: LawContext) -> list[Draft]:
@@ -63,9 +64,6 @@ class WheelTurns(Family):
         functions = _FUNCTIONS.format(cos=_of_run("cos", runs), sin=_of_run("sin", runs))
         return self.draft((*strengths, radius), _METHOD.format(pick=_pick(axles, runs)), functions, variant=variant,
                           words=("needs_road = True",))
-
-    def narrower(self, draft: Draft, context: LawContext) -> list[Draft]:
-        return []
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         axles = ("front", "rear") if any(name.startswith("front") for name in found.values) else ("",)
