@@ -83,32 +83,56 @@ def another_car(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen]
                       {wide.prior.names[index]: float(np.expm1(logs[index])) for index in far})
 
 
-def reading_gain(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen], predictions: Sequence[Array],
-                 tolerance: Tolerance) -> float | None:
-    """How many times what rigs do was read: by the rig, of all that the tolerance allows, whose motion is likest to the
-    readings, whatever their size. None: it may be theirs, as the model explains them, no such rig moves like them, or
-    the factor is a sensor's, or of friction of a guide that nearly holds the rig, or what the vehicle's masses and
-    springs may be off by where a force was measured.
+@dataclass(frozen=True)
+class LikeliestRig:
+    """How the readings of runs compare with the rig, of all that a tolerance allows, whose motion is likest to them.
+
+    gains     how many times what that rig does each run read (runs,)
+    errors    NRMSE of that rig, times these gains, on each run (runs,)
+    least     from this factor on, either way, a gain is no sensor's, and not what the vehicle's masses and springs may
+              be off by where a force was measured; infinite where these are not known
+    """
+
+    gains: Array
+    errors: Array
+    least: float
+
+    @property
+    def explains(self) -> Array:
+        """Whether it moves as each run did (runs,)."""
+        return np.asarray((self.errors < _GOOD_ERROR) & (self.gains > 0))
+
+    @property
+    def is_misread(self) -> Array:
+        """Whether each run reads as no sensor does (runs,)."""
+        return np.abs(np.log(np.where(self.explains, self.gains, 1.0))) > np.log(self.least)
+
+
+def likeliest_rig(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen], predictions: Sequence[Array],
+                  tolerance: Tolerance) -> LikeliestRig | None:
+    """The rig whose motion is likest to that of runs, whatever the size of their readings; None where the model
+    explains each of them.
 
     predictions    of the model (n,) per run
     """
-    if normalised_rms_error(runs, predictions) < POOR_ERROR:
+    if all(normalised_rms_error([run], [one]) < POOR_ERROR for run, one in zip(runs, predictions, strict=True)):
         return None
     wide = Posterior(SimulatedRuns(list(map(_first_part, runs))), vehicle, tolerance)
 
-    def gain_and_error(predictions: Sequence[Array]) -> tuple[float, float]:
-        read, model = (np.concatenate([one - one.mean() for one in parts]) for parts in zip(*(
-            (run.kept_mps2, run.main(one)[run.first:]) for run, one in zip(wide.runs.runs, predictions, strict=True)),
-            strict=True))
-        gain = float(read @ model / max(model @ model, 1e-300))
-        return gain, float(np.linalg.norm(read - gain * model) / np.linalg.norm(read))
+    def gains_and_errors(predictions: Sequence[Array]) -> tuple[Array, Array]:
+        found = []
+        for run, one in zip(wide.runs.runs, predictions, strict=True):
+            read, model = run.kept_mps2 - run.kept_mps2.mean(), run.main(one)[run.first:]
+            model = model - model.mean()
+            gain = float(read @ model / max(model @ model, 1e-300))
+            found.append((gain, float(np.linalg.norm(read - gain * model) / max(np.linalg.norm(read), 1e-300))))
+        gains, errors = np.array(found).T
+        return gains, errors
 
-    logs = _cross_entropy_search(wide, effects, lambda predictions: gain_and_error(predictions)[1])
-    gain, error = gain_and_error(wide.runs.predict(wide.car(effects, logs)))
-    sensor = SENSOR_GAIN.parameters[0]
+    logs = _cross_entropy_search(wide, effects, lambda found: float(np.linalg.norm(gains_and_errors(found)[1])))
     scale_std = wide.prior.scale_deviation if wide.shows_forces else 0.0
-    is_far = scale_std < 1 and abs(np.log(abs(gain))) > max(np.log(sensor.high), CONFLICT_SIGMA * scale_std)
-    return gain if error < _GOOD_ERROR and gain > 0 and is_far else None
+    least = max(SENSOR_GAIN.parameters[0].high, np.exp(CONFLICT_SIGMA * scale_std)) if scale_std < 1 else np.inf
+    return LikeliestRig(*gains_and_errors(wide.runs.predict(wide.car(effects, logs))), least)
 
 
 def _first_part(run: Run) -> Run:

@@ -677,9 +677,12 @@ def test_another_unit_is_said(tmp_path: Path, read: float, pushed: float, words:
     record = {"accel_z_mps2": moved["accel_z_mps2"] * read}
     (tmp_path / "bench.yaml").write_text(bench.yaml.replace("0.8", "0.8 +- 1%").replace("2000.0", "1500 +- 30%"))
     run = written(tmp_path / "run", record, {"force_n": push(TIME_S) * pushed}, BODY)
+    right = written(tmp_path / "right", {"accel_z_mps2": moved["accel_z_mps2"]}, {"force_n": push(TIME_S)}, BODY)
     for verb in ("compare", "identify"):
-        with pytest.raises(BadInput, match=words):
-            main([verb, "--vehicle", str(tmp_path / "bench.yaml"), str(run)])
+        for runs in ([run], [right, run]):
+            with pytest.raises(BadInput, match=words) as refused:
+                main([verb, "--vehicle", str(tmp_path / "bench.yaml"), *map(str, runs)])
+            assert str(refused.value).startswith(f"{run}:")
 
 
 def test_a_number_far_from_what_its_file_knows_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -22,7 +22,7 @@ from logger.dsp.channel_faults import at_ends, goes_against, longest_still
 from logger.dsp.repeated_samples import find_repeats, stretches_of
 from logger.dsp.whole_record import thinned
 from logger.errors import BadInput
-from logger.lab.another_car import AnotherCar, another_car, error_with_best_effect, reading_gain
+from logger.lab.another_car import AnotherCar, LikeliestRig, another_car, error_with_best_effect, likeliest_rig
 from logger.lab.likelihood.lag import SLOWEST_MPS
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.whittle import HIGHEST_OF_RATE, LOWEST_HZ
@@ -103,11 +103,11 @@ def check_model(word: str, model: CarModel, runs: SimulatedRuns, warn: Callable[
     """
     predictions = check_moves(word, model, runs)
     car = compose(model.vehicle, model.effects)
-    followed = _followed(runs, predictions, car)
+    followed, rig = _followed(runs, predictions, car), _likeliest_rig(model, runs, predictions, tolerance)
     # One after the other: whether it is the car is asked of runs that are right, and takes seconds.
     _say(chain(_other_ways_up(runs, followed), _other_units(runs, followed),
-               _other_units_on_rig(model, runs, predictions, tolerance), _other_units_of_signals(runs, predictions),
-               _other_roads(runs, followed, car),
+               _other_units_on_rig(runs, rig), _other_units_of_signals(runs, predictions),
+               _other_roads(runs, followed, car, rig),
                _another_car(word, model, runs, predictions, known, tolerance.largest)), warn, anyway)
     return predictions
 
@@ -132,8 +132,9 @@ def check_roads(word: str, model: CarModel, runs: SimulatedRuns, warn: Callable[
     """Raise BadInput where a run was driven over another road than that of its profile, or a rig's is in another unit,
     as ``check_model``: all that can be asked where the vehicle's numbers may be far off."""
     car, predictions = compose(model.vehicle, model.effects), predicted(word, model, runs, model.effects)
-    _say(chain(_other_units_on_rig(model, runs, predictions, Tolerance.of(model.known).widened()),
-               _other_roads(runs, _followed(runs, predictions, car), car)), warn, anyway)
+    rig = _likeliest_rig(model, runs, predictions, Tolerance.of(model.known).widened())
+    _say(chain(_other_units_on_rig(runs, rig), _other_roads(runs, _followed(runs, predictions, car), car, rig)), warn,
+         anyway)
 
 
 def predicted(word: str, model: CarModel, runs: SimulatedRuns, effects: Sequence[Chosen]) -> list[Array]:
@@ -221,25 +222,29 @@ def _other_units(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
                    f"model says: {what} in {unit}")
 
 
-def _other_units_on_rig(model: CarModel, runs: SimulatedRuns, predictions: Sequence[Array], tolerance: Tolerance
-                        ) -> Iterator[str]:
+def _likeliest_rig(model: CarModel, runs: SimulatedRuns, predictions: Sequence[Array], tolerance: Tolerance
+                   ) -> LikeliestRig | None:
+    if not all(isinstance(run.track, Excitation) and not run.track.is_still for run in runs.runs):
+        return None
+    return likeliest_rig(runs.runs, model.given or model.vehicle, model.effects, predictions, tolerance)
+
+
+def _other_units_on_rig(runs: SimulatedRuns, rig: LikeliestRig | None) -> Iterator[str]:
     """That what rigs did, or what drives them, was written in another unit."""
-    run, main = runs.runs[0], runs.runs[0].facts.main
-    track = run.track
-    if not isinstance(track, Excitation) or track.is_still:
-        return
-    gain = reading_gain(runs.runs, model.given or model.vehicle, model.effects, predictions, tolerance)
-    if gain is None:
-        return
-    drives = {"force": "force_n"} if track.forces else {"displacement": (
-        "displacement_m" if track.moves_part else "elevation_m")}
-    sizes = [(main.name, unit, size) for unit, size in _SIZES[_KINDS.get(main.measures, main.measures)]]
-    sizes += [(name, unit, 1 / size) for kind, name in drives.items() for unit, size in _SIZES[_KINDS.get(kind, kind)]]
-    nearest = min((size for _, _, size in sizes), key=lambda size: abs(log(gain / size)))
-    likely = " or ".join(f"{name} in {unit}" for name, unit, size in sizes
-                         if abs(size / nearest - 1) < _NEAR and abs(log(gain / nearest)) < log(_APART))
-    yield (f"{run.name}: expected N, m and m/s2, found {main.name} {gain:.3g} times what any rig reads that the "
-           f"vehicle's file allows: " + (f"it looks like {likely}" if likely else "is a column in another unit?"))
+    for k in np.flatnonzero(rig.is_misread if rig is not None else ()):
+        run, gain = runs.runs[k], rig.gains[k]
+        main, track = run.facts.main, run.track
+        assert isinstance(track, Excitation)
+        drives = {"force": "force_n"} if track.forces else {"displacement": (
+            "displacement_m" if track.moves_part else "elevation_m")}
+        sizes = [(main.name, unit, size) for unit, size in _SIZES[_KINDS.get(main.measures, main.measures)]]
+        sizes += [(name, unit, 1 / size) for kind, name in drives.items()
+                  for unit, size in _SIZES[_KINDS.get(kind, kind)]]
+        nearest = min((size for _, _, size in sizes), key=lambda size: abs(log(gain / size)))
+        likely = " or ".join(f"{name} in {unit}" for name, unit, size in sizes
+                             if abs(size / nearest - 1) < _NEAR and abs(log(gain / nearest)) < log(_APART))
+        yield (f"{run.name}: expected N, m and m/s2, found {main.name} {gain:.3g} times what any rig reads that the "
+               f"vehicle's file allows: " + (f"it looks like {likely}" if likely else "is a column in another unit?"))
 
 
 def _other_units_of_signals(runs: SimulatedRuns, predictions: Sequence[Array]) -> Iterator[str]:
@@ -257,8 +262,9 @@ def _other_units_of_signals(runs: SimulatedRuns, predictions: Sequence[Array]) -
                        f"says: it looks like {unit}")
 
 
-def _other_roads(runs: SimulatedRuns, followed: _Followed, car: Car) -> Iterator[str]:
-    """Which runs do not follow their road, and where they would fit."""
+def _other_roads(runs: SimulatedRuns, followed: _Followed, car: Car, rig: LikeliestRig | None) -> Iterator[str]:
+    """Which runs do not follow their road, and where they would fit. What resonates longer than a segment of a spectrum
+    lasts is coherent with nothing: of rigs one that is not refuted has to explain nothing either."""
     strangers = [k for k, one in enumerate(followed.around) if one.is_refuted]
     if not strangers and followed.around and pool(followed.around).is_refuted:
         strangers = list(range(len(followed.around)))
@@ -266,6 +272,8 @@ def _other_roads(runs: SimulatedRuns, followed: _Followed, car: Car) -> Iterator
         found, run = followed.around[k], runs.runs[k]
         if run.past is Past.FREE or (run.timed and _is_coherent(run, car)):
             continue  # nothing drives what is let go, and its mode may lie anywhere
+        if rig is not None and rig.explains[k]:
+            continue
         what = "a record that follows its excitation" if run.timed else "a drive that follows the road of its profile"
         yield (f"{run.name}: expected {what}, found one that does not (correlation {found.correlation:.2f} around the "
                f"body's bounce; chance gives up to {found.chance:.2f}): {_advice(run, car, followed.band_hz)}")
