@@ -125,7 +125,7 @@ def likeliest_rig(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chose
             read, model = run.kept_mps2 - run.kept_mps2.mean(), run.main(one)[run.first:]
             model = model - model.mean()
             gain = float(read @ model / max(model @ model, 1e-300))
-            found.append((gain, float(np.linalg.norm(read - gain * model) / max(np.linalg.norm(read), 1e-300))))
+            found.append((gain, float(np.linalg.norm(read - gain * model)) / max(float(np.linalg.norm(read)), 1e-300)))
         gains, errors = np.array(found).T
         return gains, errors
 

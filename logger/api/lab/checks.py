@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import chain
+from itertools import chain, compress
 from math import log
 from pathlib import Path
 from statistics import median
@@ -231,8 +231,8 @@ def _likeliest_rig(model: CarModel, runs: SimulatedRuns, predictions: Sequence[A
 
 def _other_units_on_rig(runs: SimulatedRuns, rig: LikeliestRig | None) -> Iterator[str]:
     """That what rigs did, or what drives them, was written in another unit."""
-    for k in np.flatnonzero(rig.is_misread if rig is not None else ()):
-        run, gain = runs.runs[k], rig.gains[k]
+    for run, gain in () if rig is None else zip(compress(runs.runs, rig.is_misread), rig.gains[rig.is_misread],
+                                                strict=True):
         main, track = run.facts.main, run.track
         assert isinstance(track, Excitation)
         drives = {"force": "force_n"} if track.forces else {"displacement": (
