@@ -449,7 +449,7 @@ def _of_fit(one: CandidateFit, before: HoldOut, count: int, fits: Sequence[Candi
 def _of_promise(base: Baseline, one: Screened, before: HoldOut, count: int) -> CandidateEffect:
     """A candidate that was screened only, at the best strength of its trial."""
     trial = one.trials[0]
-    there = cross_validate(base.linear, [change[None] for change in trial.change])
+    there = cross_validate(base.linear, [change[None] for change in trial.change()])
     gain = trial.gain - len(free_parameters_of([trial.one])) * float(np.log(base.posterior.freedom))
     by_chance = chance_of([trial.one], gain, base.posterior.freedom, count)
     return CandidateEffect(one.effect, trial.one.values, there.error, by_chance, gain,

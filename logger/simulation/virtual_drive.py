@@ -96,7 +96,9 @@ def recorded_distance(car: Car, distance_m: Array) -> Array:
     raise ValueError("the recorded distance would not say where the car was")
 
 
-_KEPT_PASSAGES = 6
+_KEPT_PASSAGES, _KEPT_STEPS = 6, 400_000
+"""Of each run so many passages are kept, of so many steps in all, but two of each: a fit asks for fine and for rough
+ones. Places under wheels take some 80 bytes a step, and a quarter of the time that stepping takes."""
 _STEPPERS = 2
 _HOP_HZ = 13.0  # of a car's wheels
 _MOST_FINER = 16
@@ -211,8 +213,9 @@ class SimulatedRuns:
             passage = self._passages[index].get(key)  # another thread may put others in its place at any time
             if passage is None:
                 passage = Passage(track, run.rate_hz, distance, fine_hz, index, is_free)
-                kept = [*self._passages[index].items()][-_KEPT_PASSAGES + 1 :]
-                self._passages[index] = dict(kept) | {key: passage}
+                kept = [*({key: passage} | self._passages[index]).items()][:_KEPT_PASSAGES]
+                steps = np.cumsum([len(one.way.distance_m) for _, one in kept])
+                self._passages[index] = dict(kept[: max(2, int(np.searchsorted(steps, _KEPT_STEPS, "right")))])
             found.append(passage)
         return found
 

@@ -265,7 +265,10 @@ def fine_outputs(car: Car, passage: Passage, outputs: Sequence[Output]) -> Array
 def linear_outputs(structure: Structure, passage: Passage, outputs: Sequence[Output]) -> Array:
     """Outputs at the fine instants (p, M), of a linear car."""
     observe, direct = structure.output_matrices(outputs)
-    return (in_blocks(structure, passage, observe) + smooth(*passage.under_wheels(structure)) @ direct.T).T
+    found = in_blocks(structure, passage, observe)
+    if direct.any():  # what is felt on the body comes through springs and dampers alone
+        found += smooth(*passage.under_wheels(structure)) @ direct.T
+    return found.T
 
 
 def _friction_of_held(laws: CornerLaws, rate_mps: Array, rise_mps2: Array, step_s: float) -> Array:
@@ -297,11 +300,13 @@ def _of_motion(structure: Structure, motion: Motion, inputs: Array, outputs: Seq
 def in_blocks(structure: Structure, passage: Passage, observe: Array) -> Array:
     """Outputs (M, p) ``observe`` (p, 2 n) of the state at the fine instants, of a linear car."""
     inputs, mean = passage.under_wheels(structure)
-    around = np.concatenate([2 * inputs[:1] - mean[:1], mean, 2 * inputs[-1:] - mean[-1:]])
     transition, gain = _linear_step(structure, passage.step_s)
+    around = np.concatenate([2 * inputs[:1] - mean[:1], mean, 2 * inputs[-1:] - mean[-1:]])
     driving = np.hstack([mean, (around[2:] - around[:-2]) / 4])
-    moves = driving.any(axis=0) & gain.any(axis=0)  # the base of a rig that a force drives is at rest
-    return driven_outputs(transition, gain[:, moves], observe, driving[:, moves],
+    if structure.on_base:  # that of a rig which a force drives is at rest
+        moves = driving.any(axis=0) & gain.any(axis=0)
+        driving, gain = driving[:, moves], gain[:, moves]
+    return driven_outputs(transition, gain, observe, driving,
                           begun(structure.at_rest(inputs[0]), passage.begins))
 
 

@@ -65,7 +65,7 @@ APPROACH_S = 2.0
 _TAIL_S = 2.5
 # What rings in a sensor at the end of a transform has died down so much later, before it comes round to the beginning.
 _REST_S = 1.0
-_KEPT_PLACES, _KEPT_BODIES = 3, 6
+_KEPT_PLACES, _KEPT_BODIES = 2, 6
 B = TypeVar("B")
 
 

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
 from logger.profiles.track import Track
 from logger.roads.obstacles import speed_bump
+from logger.runs import Run
 from logger.shipped import vehicle_file
 from logger.simulation.virtual_drive import (
     AFTER_S,
     SENSOR,
     Obstacle,
     SensorErrors,
+    SimulatedRuns,
     as_sensed,
     at_one_speed,
     motion_along,
@@ -86,3 +90,18 @@ def test_a_sensor_adds_noise_of_one_seed_and_rounds() -> None:
     assert noisy.std() == pytest.approx(0.2, rel=0.05)
     assert np.array_equal(noisy, as_sensed(still, SensorErrors(0.2)))
     assert set(np.unique(as_sensed(still, SensorErrors(0.2, 0.5)))) <= {-1.0, -0.5, 0.0, 0.5, 1.0}
+
+
+def test_a_long_run_keeps_a_few_ways_over_its_road_only() -> None:
+    """A fit asks for many ways, millimetres apart: the last ones are kept, but not six of ten minutes."""
+    distance_m = 10.0 * np.arange(60_000) / 100.0
+    run = Run("run", 100.0, np.zeros(60_000), distance_m, np.full(60_000, 10.0), FLAT)
+    runs = SimulatedRuns([run], 500.0)
+    tracemalloc.start()
+    try:
+        for error_m in np.linspace(0.0, 0.01, 5):
+            runs.predict(compose(CAR), [np.full(60_000, error_m)])
+        kept_bytes, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert kept_bytes < 40e6  # the run has seven columns of 0.5 MB, and one way over it takes 15 MB

@@ -12,7 +12,6 @@ from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
-from math import isqrt
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -45,14 +44,10 @@ class _Record:
     here: Array
 
     @staticmethod
-    def of(error: RecordError, slopes: csr_array, whitener: JointWhitener, residual: Array,
-           here: Array) -> _Record:
+    def of(error: RecordError, slopes: csr_array, whitener: JointWhitener, residual: Array, here: Array) -> _Record:
         """With derivatives (k, n), at a residual (n,) and the numbers (k,)."""
-        white = np.empty((error.count, whitener.kept))
-        some = isqrt(error.count)
-        for first in range(0, error.count, some):  # a spectrum of all would be large
-            white[first : first + some] = whitener(slopes[first : first + some].toarray())
-        return _Record(error, slopes, whitener, white @ white.T, white @ whitener(residual), here)
+        gradient = slopes @ whitener.adjoint(whitener(residual))
+        return _Record(error, slopes, whitener, whitener.products(slopes), gradient, here)
 
     def projected(self, white: Array) -> Array:
         """Products (k,) or (k, m) of the whitened derivatives with whitened samples (kept,) or (m, kept)."""
@@ -173,15 +168,12 @@ class LinearModel:
 
     def hold_fixed(self, names: Sequence[str]) -> LinearModel:
         """The model with some of the car's numbers held fixed."""
-        away = [self.prior.names.index(name) for name in names if name in self.prior.names]
-        if not away or self.numbers is None:
+        kept = ~np.isin(self.prior.names, list(names))
+        if kept.all() or self.numbers is None:
             return self
         found = copy(self)
-        found.numbers = [one.copy() for one in self.numbers]
-        found.white = [one.copy() for one in self.white]
-        found._record_projections = [one.copy() for one in self._record_projections]
-        for number, white, absorbed in zip(found.numbers, found.white, found._record_projections, strict=True):
-            number[away], white[away], absorbed[:, away] = 0.0, 0.0, 0.0
+        found.numbers, found.white = ([one * kept[:, None] for one in some] for some in (self.numbers, self.white))
+        found._record_projections = [one * kept for one in self._record_projections]
         return found
 
     def _most_likely_size(self, size: ErrorSize) -> ErrorSize:
@@ -272,18 +264,13 @@ class LinearModel:
 
     def information(self, own: Sequence[Array] | None = None) -> Array:
         """Information on the car's numbers and on those of whitened columns (m, kept) per run: (p + m, p + m)."""
-        p = self.count
-        found = sum(white @ white.T - absorbed.T @ absorbed
-                    for white, absorbed in zip(self.white, self._record_projections, strict=True))
-        found = np.asarray(found) + (np.diag(self.prior.precision) if p else 0.0)
-        if own is None:
-            return found
-        own_projections = self.record_projections(own)
-        mixed = sum((one @ white.T - mine.T @ absorbed for one, mine, white, absorbed in zip(
-            own, own_projections, self.white, self._record_projections, strict=True)), np.zeros((len(own[0]), p)))
-        alone = sum((one @ one.T - mine.T @ mine for one, mine in zip(own, own_projections, strict=True)),
-                    np.zeros((len(own[0]), len(own[0]))))
-        return np.block([[found, mixed.T], [mixed, alone]])
+        parts = list(zip(self.white, self._record_projections, strict=True))
+        if own is not None:
+            parts = [(np.vstack([white, one]), np.hstack([absorbed, mine])) for (white, absorbed), one, mine in zip(
+                parts, own, self.record_projections(own), strict=True)]
+        found = np.asarray(sum(white @ white.T - absorbed.T @ absorbed for white, absorbed in parts))
+        np.einsum("ii->i", found)[: self.count] += self.prior.precision if self.count else 0.0
+        return found
 
     def gradient(self, residuals: Sequence[Array], logs: Array, own: Sequence[Array] | None = None) -> Array:
         """Half of the negative gradient of the objective by the same numbers (p + m,), by whitened residuals (kept,)
@@ -294,16 +281,6 @@ class LinearModel:
             return found
         by_own = sum((columns @ one for columns, one in zip(own, residuals, strict=True)), np.zeros(len(own[0])))
         return np.concatenate([found, by_own])
-
-    def cross_products(self, own: Sequence[Array]) -> tuple[Array, float]:
-        """Products of one whitened column (kept,) per run with the columns of the car's numbers (p,), and with
-        itself."""
-        columns = [one[None] for one in own]
-        own_projections = self.record_projections(columns)
-        mixed = sum((white @ one[0] - known.T @ mine[:, 0] for white, known, one, mine in zip(
-            self.white, self._record_projections, columns, own_projections, strict=True)), np.zeros(self.count))
-        return mixed, sum(float(one @ one) - float((mine**2).sum())
-                          for one, mine in zip(own, own_projections, strict=True))
 
 
 def whitened(posterior: Posterior, whiteners: Sequence[JointWhitener], columns: Sequence[Array],

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from logger.arrays import Array
 from logger.lab.likelihood.readings import Readings
 from logger.lab.likelihood.whittle import Bands, Whitener
 from logger.runs import Run
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
 
 
 def bands_of(run: Run) -> JointBands:
@@ -76,6 +80,11 @@ class JointWhitener:
     def __call__(self, samples: Array) -> Array:
         parts = np.split(samples, len(self.each), axis=-1)
         return np.concatenate([one(part) for one, part in zip(self.each, parts, strict=True)], axis=-1)
+
+    def products(self, rows: csr_array) -> Array:
+        n = rows.shape[1] // len(self.each)
+        return sum((one.products(rows[:, place * n : (place + 1) * n]) for place, one in enumerate(self.each)),
+                   np.zeros((rows.shape[0], rows.shape[0])))
 
     def adjoint(self, white: Array) -> Array:
         kept = np.cumsum([one.kept for one in self.each])[:-1]

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 
 import numpy as np
@@ -151,14 +151,15 @@ class Trial:
 
     gain      by how much minus twice the log of the evidence would fall, its numbers not counted
     logs      the car's numbers then (p,)
-    change    of the predictions by the effect at its values (n,), per run [m/s2]
+    change    of the predictions by the effect at its values (n,), per run [m/s2]; simulated when it is asked for, as
+              those of all trials of all effects would be many times the records
     start     where a fit begins, if with other distance errors; None: at the baseline
     """
 
     one: Chosen
     gain: float
     logs: Array
-    change: list[Array]
+    change: Callable[[], list[Array]]
     start: State | None = None
 
 
@@ -298,10 +299,11 @@ def _change(base: Baseline, more: Sequence[Chosen], logs: Array) -> list[Array]:
 def _trial_at_best_strength(base: Baseline, one: Chosen) -> Trial:
     """The trial at its best strength."""
     linear, quadratic = base.linear, base.quadratic
-    change = _change(base, [one], base.state.logs)
-    white = linear.whitened(change)
+    change = partial(_change, base, [one], base.state.logs)
+    white = linear.whitened(change())
     here = base.state.logs + quadratic.newton_step
-    mixed, own = linear.cross_products(white)
+    products = linear.information([one[None] for one in white])[-1]
+    mixed, own = products[:-1], float(products[-1])
     absorbed = quadratic.covariance @ mixed
     along = (sum(float(c @ r) for c, r in zip(white, quadratic.residuals, strict=True))
              - float(mixed @ quadratic.newton_step))
@@ -342,7 +344,7 @@ def _trial_at_best_strengths(base: Baseline, one: Chosen, strengths: Sequence[in
     without = np.linalg.solve(information[:p, :p], gradient[:p]) if p else np.empty(0)
     there = with_coordinates(effects, free, coordinates_of(effects, free) + step[p:])
     return Trial(there[-1], float(gradient @ step - gradient[:p] @ without), state.logs + step[:p],
-                 [step[p:] @ one for one in slopes])
+                 lambda: [step[p:] @ one for one in slopes])
 
 
 def _goes_both_ways(effect: Effect) -> bool:
@@ -354,9 +356,9 @@ def _goes_both_ways(effect: Effect) -> bool:
 def _with_predicted_gain(base: Baseline, trial: Trial) -> Trial:
     """The trial with the gain of a full prediction, the car's numbers to first order."""
     state, linear = base.state, base.linear
-    change, step = _change(base, [trial.one], state.logs), trial.logs - state.logs
+    step = trial.logs - state.logs
     moved_there = [fine + more + step @ columns for fine, more, columns in zip(
-        state.predictions, change, linear.numbers or (), strict=True)]
+        state.predictions, _change(base, [trial.one], state.logs), linear.numbers or (), strict=True)]
     return replace(trial, gain=base.quadratic.objective - linear.objective(moved_there, trial.logs))
 
 
@@ -368,8 +370,8 @@ def _trial_at_values(base: Baseline, one: Chosen, besides: tuple[Chosen, ...] = 
     """
     linear = base.linear.hold_fixed(one.effect.replaces)
     logs = np.where(np.isin(linear.prior.names, one.effect.replaces), 0.0, base.state.logs)
-    change = _change(base, (one, *besides), logs)
-    found = linear.fit_record_errors([fine + more for fine, more in zip(base.state.predictions, change, strict=True)])
+    change = partial(_change, base, (one, *besides), logs)
+    found = linear.fit_record_errors([fine + more for fine, more in zip(base.state.predictions, change(), strict=True)])
     gradient = linear.gradient(found.residuals, logs)
     step = np.linalg.solve(linear.information(), gradient)
     objective = found.squares + linear.prior.cost(logs) - float(gradient @ step)

@@ -124,14 +124,6 @@ def test_the_gradient_is_that_of_the_objective() -> None:
     assert found / size == pytest.approx(expected / size, abs=1e-4)
 
 
-def test_one_column_has_the_products_of_the_information() -> None:
-    one = case()
-    information = one.linear.information(one.own)
-    mixed, with_itself = one.linear.cross_products([each[0] for each in one.own])
-    assert mixed == pytest.approx(information[one.linear.count, : one.linear.count])
-    assert with_itself == pytest.approx(information[one.linear.count, one.linear.count])
-
-
 def test_the_score_is_the_cost_and_what_records_and_effects_are_charged() -> None:
     one, whole = case(), dense(case())
     columns, precision = whole.columns[whole.outer:], whole.precision[whole.outer:, whole.outer:]

@@ -9,6 +9,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 from scipy.signal import welch
+from scipy.sparse import csr_array, vstack
 
 from logger.lab.likelihood.signals import deviance
 from logger.lab.likelihood.whittle import DISCREPANCY, Bands
@@ -86,6 +87,23 @@ def test_products_are_those_of_the_whitened_samples(samples: int) -> None:
     whitener = Bands(run_of(samples)).whitener(other)
     rows, times = whitener(np.stack([one, other])), whitener.in_time(np.stack([one, other]))
     assert rows @ rows.T == pytest.approx(times @ times.T, rel=2e-3, abs=2e-3 * (times[0] @ times[0]))
+
+
+@pytest.mark.parametrize(("seconds", "off"), [(60, 1e-12), (240, 0.003)])
+def test_products_of_sparse_rows_are_those_of_the_whitened_rows_summed_stretch_by_stretch_where_a_run_is_long(
+        seconds: int, off: float) -> None:
+    """A run of one stretch is whitened as a whole; of a longer one hardly anything is different, also where the sum of
+    the short rows is all but one of the long ones, as a scale of the way is."""
+    n = 100 * seconds
+    whitener = Bands(run_of(n, measured=white(n, 3))).whitener(coloured(n))
+    swings = np.sin(0.09 * np.arange(n)) + white(n)
+    short = csr_array([np.where(abs(np.arange(n) - middle) < 100, swings, 0.0) for middle in range(500, n - 400, 100)])
+    rows = csr_array(vstack([short, csr_array([1.001 * short.sum(axis=0)])]))
+    dense, found = whitener(rows.toarray()), whitener.products(rows)
+    sizes = np.sqrt((dense**2).sum(axis=1))
+    assert np.abs(found - dense @ dense.T).max() < off * sizes.max() ** 2
+    assert np.abs((found - dense @ dense.T) / np.outer(sizes, sizes)).max() < off
+    assert np.linalg.eigvalsh(found)[0] > -1e-9 * found.max()
 
 
 def test_columns_are_weighed_like_a_residual_and_the_beginning_counts_nowhere() -> None:

@@ -50,7 +50,7 @@ def test_a_promise_is_what_dense_least_squares_gain_by_the_change(slight: Baseli
     found = screen(slight, EFFECTS[name], [STILL])
     trial = found.trials[0]
     before, _ = dense.least(dense.residual, dense.here)
-    after, there = dense.least(dense.residual, dense.here, dense.white(trial.change))
+    after, there = dense.least(dense.residual, dense.here, dense.white(trial.change()))
     assert trial.start is None and found.gain == trial.gain
     best = before - after
     strength, weakest = there[-1], -10 if EFFECTS[name].parameters[0].low < 0 else 0.03
