@@ -329,7 +329,8 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
         lines += [_missing(found, one), *([_confusion(group, found)] if len(group) > 1 else [])]
     if not found.missing and not found.exceeds_noise:
         more = " else" * bool(found.removed.drifting_sensors or found.removed.distance_error_m > 0)
-        what, how = ("No effect", "") if found.beyond else (f"Nothing{more}", " within their tolerance")
+        moved = found.beyond or found.in_conflict
+        what, how = ("No effect", "") if moved else (f"Nothing{more}", " within their tolerance")
         is_so = "needed" if found.in_conflict else "missing"
         most = "calibration errors of the sensors" if found.within_calibration else "the sensor's noise"
         lines.append(f"{what} is {is_so}: with the model's parameters refitted{how}, the residual is hardly more than "

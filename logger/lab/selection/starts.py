@@ -23,14 +23,17 @@ from logger.lab.likelihood.by_squares import BySquares
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit, fit_model
 from logger.lab.likelihood.posterior import NotSimulated, Posterior, State
-from logger.lab.likelihood.priors import VehiclePrior
+from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly
 from logger.lab.selection.evidence import INDISTINGUISHABLE
 from logger.lab.selection.screening import Baseline, Screened, Trial, effects_without
 from logger.lab.selection.stepwise import MeasuredRoad, Progress
+from logger.runs import Past, Run
 from logger.simulation.virtual_drive import SEARCH_HZ
 from logger.vehicle.effect import Chosen, Effect, Misalignment, Sought, chosen
+from logger.vehicle.models import structure_of
+from logger.vehicle.modes import undamped_frequencies_hz
 from logger.vehicle.named_parameters import WEAKEST
 
 _Drawn = tuple[float, State]
@@ -180,7 +183,7 @@ class UnknownNumbers(MeasuredRoad):
               ) -> list[list[_Drawn]]:
         """The best cars of each kind with the effects of a state and one more, the best first. Cars are drawn once for
         an effect; later rounds begin where these ended, and at its trials on the model."""
-        cars = self._known(effect, near, trials) or self._draw(effect, by_squares.posterior.prior, near)
+        cars = self._known(effect, near, trials) or self._draw(effect, by_squares.posterior, near)
         ranked = [[(by_squares.rank(effects, logs, near), effects, logs) for effects, logs in some] for some in cars]
         return [[state for _, having, there in sorted(some, key=_by_deviance)[: self.starts]
                  if (state := by_squares.at(having, there, near)) is not None] for some in ranked]
@@ -200,10 +203,11 @@ class UnknownNumbers(MeasuredRoad):
         forms = ([car for car in cars if car[0][-1].is_plain is plain] for plain in (True, False))
         return [some for some in forms if some]
 
-    def _draw(self, effect: Effect | None, prior: VehiclePrior, near: State) -> list[list[_Car]]:
+    def _draw(self, effect: Effect | None, posterior: Posterior, near: State) -> list[list[_Car]]:
         """Cars that are drawn around the file's, and as many around a state; with the effect in its plain form, and as
         many with its refinements. A state without the effect is in a valley of its own, whose cars are the better ones
-        before they are improved."""
+        before they are improved. What was let go rings at a mode, which may be too sharp to be drawn by chance."""
+        prior, ringing_hz = posterior.prior, _ringing_hz(posterior.runs.runs)
         rng = np.random.default_rng(crc32((effect.name if effect else "").encode()))
         trials = [chosen(effect, values) for values in effect.trials()] if effect else []
         forms = [some for plain in (True, False) if (some := [one for one in trials if one.is_plain is plain])]
@@ -212,6 +216,8 @@ class UnknownNumbers(MeasuredRoad):
             logs = near.logs * (number % 2)
             if number > 1:
                 logs = logs + np.minimum(prior.deviations, WEAKEST) * rng.standard_normal(len(logs))
+                if ringing_hz is not None:
+                    logs = _tuned(posterior, logs, ringing_hz)
             effects = [_resized(one, rng, WEAKEST) for one in near.effects]
             pair, kind = divmod(number, len(drawn))
             if forms:
@@ -220,6 +226,29 @@ class UnknownNumbers(MeasuredRoad):
                 effects.append(_resized(some[pair % len(some)], rng, float(np.log(10.0)) / 2))
             drawn[kind].append((effects, logs))
         return drawn
+
+
+def _ringing_hz(runs: Sequence[Run]) -> float | None:
+    """The strongest frequency of what all runs did after they were let go, on average; None where something drove one.
+    """
+    if not all(run.past is Past.FREE for run in runs):
+        return None
+    found = []
+    for run in runs:
+        read = run.kept_mps2 - run.kept_mps2.mean()
+        count = 2**(len(read) - 1).bit_length() * 8  # lines closer than a lightly damped mode is wide
+        power = np.abs(np.fft.rfft(read * np.hanning(len(read)), count))
+        found.append(float(power[1:].argmax() + 1) * run.rate_hz / count)
+    return float(np.mean(found))
+
+
+def _tuned(posterior: Posterior, logs: Array, hz: float) -> Array:
+    """A car's numbers (p,) with all springs that are not known scaled so that its nearest mode is at a frequency."""
+    prior = posterior.prior
+    springs = [name.endswith("stiffness_n_per_m") for name in prior.names] & (prior.deviations > Tolerance().numbers)
+    modes_hz = undamped_frequencies_hz(structure_of(prior.vehicle(posterior.vehicle, logs)))
+    off = np.log(hz / modes_hz[modes_hz > 0])
+    return logs + 2 * off[np.abs(off).argmin()] * springs if len(off) else logs
 
 
 def fitted_from_starts(posterior: Posterior, present: Sequence[Chosen]) -> LinearModel:
