@@ -645,5 +645,5 @@ class DatedSamples:
                     "uses that rate. If the sensor's own rate is another one, samples are lost on the way")
         if BURSTS_S <= self.burst_s < LONGEST_BURSTS_S:
             return (f"its samples come {self.burst_s:.1g} s at a time, because something on the way buffers them. "
-                    "ridelog dates them by their even rate: you need do nothing")
+                    "ridelog timestamps them at their steady rate: you need do nothing")
         return ""

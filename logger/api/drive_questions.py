@@ -214,8 +214,8 @@ class ModesQuestion(Question):
       ridelog modes drive.csv --vehicle mycar.yaml
       ridelog modes --vehicle mycar.yaml --speed 20
 
-    A drive needs the vehicle: the road, and the second axle that follows the first, put peaks into its spectrum that
-    are no modes. modes fits its springs, dampers and masses to the spectrum and gives the modes of the fitted car;
+    A drive needs the vehicle: the road, and the second axle that follows the first, add peaks to its spectrum that
+    are not modes. modes fits its springs, dampers and masses to the spectrum and gives the modes of the fitted car;
     wheelbase, contact patch and the sensor's position stay as in its file. A record without speed_mps needs --speed.
 
     With --vehicle and no FILE, modes gives those of the vehicle's file with its effects, and standard deviations from

@@ -239,7 +239,7 @@ def _used(question: LearnCarQuestion) -> list[_Used]:
     blocks = sum(len(one.spectra) for one in found)
     if blocks < _FEWEST_BLOCKS:
         driven_s = sum(one.seconds for one in found)
-        raise BadInput(f"learn-car: expected two minutes of steady driving at least, found {2 * blocks} s in "
+        raise BadInput(f"learn-car: expected at least two minutes of steady driving, found {2 * blocks} s in "
                        f"{driven_s:.0f} s of drives: drive for twenty minutes, some of it at 30, 60 and 90 km/h")
     return _thinned([one for one in found if len(one.spectra)])
 
@@ -331,9 +331,9 @@ def _checked_drives(used: Sequence[_Used], knowledge: CarKnowledge, start: Array
         those = "this drive is" if len(group) == 1 else f"this and the {len(group) - 1} drives after it are"
         as_what = "the others" if len(others) > 1 else others[0].name
         raise CheckFailed(
-            f"{group[0].name}: {those} not of the same car as {as_what}: its {_words_of(name)} is {_value(own, name)}, "
-            f"not {_value(rest, name)}. Learn each car from its own drives (a trailer, a full boot or other tires "
-            "make another car)")
+            f"{group[0].name}: {those} not from the same car as {as_what}: its {_words_of(name)} is "
+            f"{_value(own, name)}, not {_value(rest, name)}. "
+            "Learn each car from its own drives (a trailer, a full boot or other tires make another car)")
     return [(spectra, rest) for _, _, _, spectra, _, rest in found]
 
 

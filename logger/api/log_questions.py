@@ -72,7 +72,7 @@ class LogsQuestion(Question):
 
 @dataclass(frozen=True)
 class SectionsQuestion(LogsQuestion):
-    """Give logs in sections, as road agencies file them: mean IRI with its standard error, condition, comfort.
+    """Divide logs into sections, as road agencies report them: mean IRI with its standard error, condition, comfort.
 
       ridelog sections /media/RIDELOG --length 0.1mi
       ridelog sections drive-logs/ --length 100m --out sections.geojson
@@ -129,7 +129,7 @@ class PassesQuestion(LogsQuestion):
         "length of a piece of road with its unit, such as 25ft, 50m, 0.1mi (default: 25m)", metavar="LENGTH", read=str,
         check=length_of)] = 25.0
     since: Annotated[str | None, Option(
-        "rows from this day on (UTC), such as 2026-04-30; those without a date then do not count", metavar="DAY",
+        "rows from this day on (UTC), such as 2026-04-30; those without a date are then left out", metavar="DAY",
         check=check_day)] = None
     until: Annotated[str | None, Option("rows before this day (UTC)", metavar="DAY", check=check_day)] = None
     split: Annotated[str | None, Option(

@@ -180,7 +180,7 @@ def _check_stands(given: record_checks.ChannelRecord | Path | str, question: Mod
     if drives and question.input_column is None and question.method not in _ONLY_DECAYS:
         raise question.complaint(
             f"{name_of(given)}: expected `vehicle` with a drive: the road, and the second axle that "
-            "follows the first, put peaks into its spectrum that are no modes. A stretch of free decay can be "
+            "follows the first, add peaks to its spectrum that are not modes. A stretch of free decay can be "
             "analysed with `method` era")
 
 
@@ -262,7 +262,7 @@ def modes_of_drive(given: ChannelRecord | Path | str, question: ModesQuestion) -
         raise question.wrong("input_column", ": expected a record without `vehicle`")
     if question.method is not None:
         raise question.wrong("method", f" {question.method}: expected none with `vehicle`, whose "
-                                       "numbers are fitted to the spectrum")
+                                       "parameters are fitted to the spectrum")
     name, start_s, rate_hz, samples, speed_mps, usable = _record(given, question)
     time_s = start_s + np.arange(len(samples)) / rate_hz
     first_s = time_s[0] + SKIP_S if question.from_s is None else question.from_s

@@ -327,8 +327,8 @@ def _change_cells(found: CombinedDrives, change: Changes, one: int, cell: int) -
 def _change_blocks(found: CombinedDrives, change: Changes) -> Iterator[Block]:
     """What changed between two periods: how much of the road, and the largest changes."""
     if not len(change.key):
-        yield ("No change can be measured: no piece of road was passed in both periods (rows without a date are in "
-               "neither).")
+        yield ("No change can be measured: no piece of road was passed in both periods; rows without a date are in "
+               "neither.")
         return
     words = [changed(change, one) for one in range(len(change.key))]
     worse, better = words.count("worse"), words.count("better")

@@ -162,7 +162,7 @@ def pictures(title: str, found: Simulated, unit: str, seconds: float, skip: int)
     """What was measured, what both models say and what they leave: where it moves most, over all the time, and by
     frequency."""
     left: dict[str, Array] = {"as a linear rig": found.measured - found.linear,
-                              "with what was named": found.measured - found.better}
+                              "with the named effects": found.measured - found.better}
     whole: Array = np.arange(len(found.measured)) / found.rate_hz
     most = min(max(skip, int(np.argmax(np.abs(found.measured[skip:]))) + skip - round(seconds * found.rate_hz / 2)),
                max(skip, len(whole) - round(seconds * found.rate_hz)))
@@ -170,8 +170,8 @@ def pictures(title: str, found: Simulated, unit: str, seconds: float, skip: int)
     closely = Curves(f"{title}: where it moves most", "time [s]", unit, (
         Line("measured", whole[part], found.measured[part], dots=True),
         Line("as a linear rig", whole[part], found.linear[part]),
-        Line("with what was named", whole[part], found.better[part]),
-        Line("residual with it", whole[part], left["with what was named"][part])))
+        Line("with the named effects", whole[part], found.better[part]),
+        Line("residual with it", whole[part], left["with the named effects"][part])))
     over = Curves(f"{title}: residual", "time [s]", unit, tuple(
         line(name, whole[skip:], np.asarray(one[skip:])) for name, one in left.items()))
     size = (len(whole) - skip) // _BLOCKS

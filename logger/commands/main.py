@@ -41,7 +41,7 @@ GROUPS = {
     },
     "Roads, from logs": {
         "report": "draw logs as one web page: where is the road rough?",
-        "sections": "give IRI and condition by section of 0.1 mi or any length, as agencies file them",
+        "sections": "give IRI and condition by section of 0.1 mi or any length, as agencies report them",
         "passes": "combine repeated drives: how rough is each place, and what changed?",
         "fleet": "combine many cars over years: which roads became worse, which cars read too high?",
         "convert": "write logs as GeoJSON, GeoPackage, GPX, KML, Parquet or CSV for other programs",
@@ -279,7 +279,7 @@ def _without_verb(arguments: list[str]) -> int:
         prog="ridelog", usage="ridelog COMMAND [OPTIONS]", formatter_class=argparse.RawDescriptionHelpFormatter,
         description="How rough is the road, and how does it feel to the people inside?", add_help=True,
         epilog=f"{verbs}\n\n'ridelog COMMAND --help' explains one command, with examples.", allow_abbrev=False)
-    parser.add_argument("--version", action="store_true", help="print the version and leave")
+    parser.add_argument("--version", action="store_true", help="print the version and exit")
     parser.add_argument("command", nargs="?", help=argparse.SUPPRESS)
     options, rest = parser.parse_known_args(arguments)  # of a command that nobody knows the rest is its own
     if rest and options.command is None:

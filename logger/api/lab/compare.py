@@ -491,7 +491,7 @@ def _tests(found: LabComparison) -> Detail:
              "found" if test in found.tests_found else "") for test in found.tests.tests]
     return Detail("All residual tests", [
         Table(("Test", "Value", "Standard error", "p-value", ""), rows, (0, 4)),
-        Hint("Found: improbable in noise, and large enough to matter.")])
+        Hint("Found: unlikely to be noise, and large enough to matter.")])
 
 
 def _numbers(found: LabComparison) -> Detail:

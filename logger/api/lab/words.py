@@ -44,7 +44,7 @@ def line_sentence(line: SpatialLine) -> str:
     every_m = 1 / line.at_per_m
     if line.steady:
         return (f"It repeats every {every_m:.2f} m of road or {line.at_per_m * line.speed_mps:.1f} times a second; at "
-                f"a steady speed these are the same (clearest in {line.run}). A drive at another speed would tell.")
+                f"a steady speed these are the same (clearest in {line.run}). A drive at another speed shows which.")
     radius_m = 1 / (2 * np.pi * line.at_per_m)
     wheel = (f" A wheel of {radius_m:.2f} m radius turns at that rate: check its balance and roundness."
              if _WHEEL_RADII_M[0] < radius_m < _WHEEL_RADII_M[1] else "")

@@ -66,7 +66,7 @@ def run(folder: Path, effort: Workload) -> Result:
     named = Statement("progressive_spring is named first (1: yes)", "a hardening spring",
                       float(found.diagnosis.verdict[:1] == (EFFECT,)), 1, 1, of=("Silverbox equation",))
     rows = (*PUBLISHED_MV, ("ridelog, as a linear rig", linear[0], linear[1], linear[2]),
-            ("ridelog, with what was named", better[0], better[1], better[2]))
+            ("ridelog, with the named effects", better[0], better[1], better[2]))
     table = Table("R.m.s. error of the simulated output [mV]", (
         Column("model"), *(Column(name.removeprefix("Silverbox "), ".3g") for name, _ in TESTS)), rows)
     return Result((table, found.effects), _verdict(found, linear, better), tuple(

@@ -40,7 +40,7 @@ class _OfMass(FrameDamping):
     parameters = (replace(FrameDamping.parameters[0], name="body_damping_n_s_per_m",
                           meaning="of the mass against its guide"),)
     signature = "the mass is damped against the ground, beyond what the damper to its base does"
-    shown_by = "shake the base slowly and quickly: a drag against the ground holds the mass back even below its bounce"
+    shown_by = "shake the base slowly and quickly: drag on the ground resists it even below the natural frequency"
     also_by = ()
 
     def structure(self, p: Values, structure: Structure) -> Structure:

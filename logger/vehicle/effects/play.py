@@ -1,4 +1,4 @@
-"""A spring with play in its seat, in a bush or in a joint: within a gap either way from rest it answers nothing.
+"""A spring with play in its seat, in a bushing or in a joint: within a gap either way from rest it answers nothing.
 
 F = k (x - g) beyond a gap g in extension, k (x + g) in compression, 0 between: what the linear spring would have
 answered within the gap, k times the travel clipped to it, is taken away. The damper beside it has no play; for that
@@ -15,7 +15,7 @@ from logger.vehicle.vehicle import Vehicle
 
 
 class Play(ForceEffect):
-    title = "play of the springs: in a seat, a bush or a joint"
+    title = "play of the springs: in a seat, a bushing or a joint"
     parameters = (
         Parameter("half_gap_m", 0.0005, 0.0, 0.02, 0.0, Scale.LINEAR, (0.0002, 0.0008, 0.003),
                   "travel from the middle in each direction, within which the spring exerts no force"),
