@@ -390,7 +390,7 @@ def blocks(found: Calibrated) -> list[Block]:
         Lines([f"{found.vehicle.name}: {settings.roads} random roads of {settings.road_m:.0f} m, IRI "
                f"{LEVELS_IRI[0]:g} to {LEVELS_IRI[-1]:g} m/km"]),
         Table(("m/s", "mph", "IRI/rms", "spread", "R2", "IRI/rms*", "spread", "R2", "rms/root Gd", "a_w/IRI",
-               f"{_COMFORT_WORD} from"), rows, ()),
+               "from IRI"), rows, ()),
         Lines([f"*: of windows of {settings.window_m:.4g} m, the others of whole roads.",
                "IRI [m/km] = IRI/rms x r.m.s. vertical acceleration [m/s2]; 68 of 100 lie within the spread.",
                f"ISO 2631-1 calls the ride '{_COMFORT_WORD}' from the last column's IRI on."])]

@@ -164,7 +164,7 @@ class Bench:
             notify(f"searching for {effect.name}")
             best = search.best_of(effect, base, {one.name: values[one.name] for one in effect.parameters
                                                  if one.choices and one.name in values})
-        return chosen(effect, {**best.chosen.values, **values}), best.found.state
+        return chosen(effect, {**best.effects[-1].values, **values}), best.state
 
     def beside(self, starts: Sequence[Chosen]) -> Bench:
         """The same with effects in the model that are about to be added."""

@@ -224,9 +224,15 @@ def _other_units(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
 
 def _likeliest_rig(model: CarModel, runs: SimulatedRuns, predictions: Sequence[Array], tolerance: Tolerance
                    ) -> LikeliestRig | None:
-    if not all(isinstance(run.track, Excitation) and not run.track.is_still for run in runs.runs):
+    """Of the runs that something drives; of what was let go it says nothing."""
+    driven = [isinstance(run.track, Excitation) and not run.track.is_still for run in runs.runs]
+    found = likeliest_rig(list(compress(runs.runs, driven)), model.given or model.vehicle, model.effects,
+                          list(compress(predictions, driven)), tolerance) if any(driven) else None
+    if found is None:
         return None
-    return likeliest_rig(runs.runs, model.given or model.vehicle, model.effects, predictions, tolerance)
+    gains, errors = np.ones(len(driven)), np.full(len(driven), np.inf)
+    gains[driven], errors[driven] = found.gains, found.errors
+    return replace(found, gains=gains, errors=errors)
 
 
 def _other_units_on_rig(runs: SimulatedRuns, rig: LikeliestRig | None) -> Iterator[str]:

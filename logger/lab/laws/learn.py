@@ -156,14 +156,17 @@ class LawSearch:
         found = search.go_on(none, search.round(base, [*drafts], to_gain=min_gain(len(drafts)))) if drafts else none
         while found.gains:
             law = found.now.effects[-1].effect
-            now, gains = self.search.eliminate_backward(self.selection.before, found.now)
+            before = found.before if base is self.selection.before else self.selection.before
+            now, gains = self.search.eliminate_backward(before, found.now)
             if law.name in gains:
                 why = refusal(drafts[law], now, self.search.without(now, law.name))
                 if why is None:
-                    return self._with_known(replace(found, before=self.selection.before, now=now, gains=gains), law)
+                    return self._with_known(replace(found, before=before, now=now, gains=gains), law)
                 self.refused[drafts[law].key] = why
             search.effects = [one for one in search.effects if one is not law]
             rest = replace(found.first, fits=tuple(one for one in found.first.fits if one.effect is not law))
+            if more := [one for one in search.effects if one.name == law.name]:  # other forms of the refused one's
+                rest = search.round(base, more, to_gain=min_gain(len(drafts)), beside=rest)
             found = search.go_on(none, rest)
         return None
 

@@ -226,8 +226,11 @@ def screen(base: Baseline, effect: Effect, misaligned: Sequence[Misalignment],
         if (there := values.get(shape, 0.0)) not in by_shape or trial.gain > by_shape[there].gain:
             by_shape[there] = trial
 
-    # At their nulls strengths have one derivative each, whatever a search begins at.
-    for values in trials[:1] if len(strengths) > 1 else trials:
+    if len(strengths) > 1:  # at their nulls they have one derivative each, whatever a search begins at
+        free = {effect.parameters[place].name for place in strengths}
+        trials = [*{tuple(value for name, value in one.items() if name not in free): one for one in reversed(trials)
+                    }.values()][::-1]
+    for values in trials:
         try_out(values)
     if AXLE in effect.parameters and base.posterior.vehicle.rear is not None:
         both = max((trial for by_shape in found.values() for trial in by_shape.values()), key=lambda one: one.gain)

@@ -24,7 +24,7 @@ from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit, fit_model
 from logger.lab.likelihood.posterior import NotSimulated, Posterior, State
 from logger.lab.likelihood.priors import Tolerance
-from logger.lab.likelihood.whittle import UNEXPLAINED
+from logger.lab.likelihood.whittle import LOWEST_HZ, UNEXPLAINED
 from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly
 from logger.lab.selection.evidence import INDISTINGUISHABLE
 from logger.lab.selection.screening import Baseline, Screened, Trial, effects_without
@@ -206,7 +206,8 @@ class UnknownNumbers(MeasuredRoad):
     def _draw(self, effect: Effect | None, posterior: Posterior, near: State) -> list[list[_Car]]:
         """Cars that are drawn around the file's, and as many around a state; with the effect in its plain form, and as
         many with its refinements. A state without the effect is in a valley of its own, whose cars are the better ones
-        before they are improved. What was let go rings at a mode, which may be too sharp to be drawn by chance."""
+        before they are improved. What was let go rings at a mode, which may be too sharp to be drawn by chance: half of
+        them have one there."""
         prior, ringing_hz = posterior.prior, _ringing_hz(posterior.runs.runs)
         rng = np.random.default_rng(crc32((effect.name if effect else "").encode()))
         trials = [chosen(effect, values) for values in effect.trials()] if effect else []
@@ -216,8 +217,8 @@ class UnknownNumbers(MeasuredRoad):
             logs = near.logs * (number % 2)
             if number > 1:
                 logs = logs + np.minimum(prior.deviations, WEAKEST) * rng.standard_normal(len(logs))
-                if ringing_hz is not None:
-                    logs = _tuned(posterior, logs, ringing_hz)
+                if ringing_hz and number // 2 % 2:
+                    logs = _tuned(posterior, logs, ringing_hz[number // 4 % len(ringing_hz)])
             effects = [_resized(one, rng, WEAKEST) for one in near.effects]
             pair, kind = divmod(number, len(drawn))
             if forms:
@@ -228,22 +229,21 @@ class UnknownNumbers(MeasuredRoad):
         return drawn
 
 
-def _ringing_hz(runs: Sequence[Run]) -> float | None:
-    """The strongest frequency of what all runs did after they were let go, on average; None where something drove one.
+def _ringing_hz(runs: Sequence[Run]) -> list[float]:
+    """The strongest frequency of what each run did after it was let go, above drifts; none where something drove one.
     """
-    if not all(run.past is Past.FREE for run in runs):
-        return None
     found = []
-    for run in runs:
+    for run in runs if all(one.past is Past.FREE for one in runs) else ():
         read = run.kept_mps2 - run.kept_mps2.mean()
         count = 2**(len(read) - 1).bit_length() * 8  # lines closer than a lightly damped mode is wide
-        power = np.abs(np.fft.rfft(read * np.hanning(len(read)), count))
-        found.append(float(power[1:].argmax() + 1) * run.rate_hz / count)
-    return float(np.mean(found))
+        hz = np.fft.rfftfreq(count, 1 / run.rate_hz)
+        found.append(float(hz[np.argmax(np.abs(np.fft.rfft(read * np.hanning(len(read)), count)) * (hz > LOWEST_HZ))]))
+    return found
 
 
 def _tuned(posterior: Posterior, logs: Array, hz: float) -> Array:
-    """A car's numbers (p,) with all springs that are not known scaled so that its nearest mode is at a frequency."""
+    """A car's numbers (p,) with all springs that are not known scaled so that, were the others scaled too, its nearest
+    mode would be at a frequency."""
     prior = posterior.prior
     springs = [name.endswith("stiffness_n_per_m") for name in prior.names] & (prior.deviations > Tolerance().numbers)
     modes_hz = undamped_frequencies_hz(structure_of(prior.vehicle(posterior.vehicle, logs)))

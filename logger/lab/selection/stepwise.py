@@ -285,15 +285,18 @@ class Search(Generic[M, P, F]):
     _rivals: dict[str, tuple[str, ...]] = field(default_factory=dict)
     _reduced: tuple[M, dict[str, M]] | None = None
 
-    def best_of(self, effect: Effect, base: M, values: Mapping[str, float]) -> F:
-        """The best fit of one effect on a model, with these of its choices, whatever it gains."""
+    def best_of(self, effect: Effect, base: M, values: Mapping[str, float]) -> M:
+        """A model with one effect more, with these of its choices, whatever it gains; with its refinements where they
+        explain most of what its plain form leaves."""
         with ThreadPoolExecutor(self.workers) as pool:
             one = self._screen_all(pool, base, [effect])[0]
         tries = self.likelihood.fitted_roughly(base.score, base, one, -np.inf)
+        tries = [each for each in tries if each.chosen.is_plain] or tries
         if not tries:
             raise ValueError(f"expected a car that can be simulated with {effect.name}, found none at its usual values")
         said = [each for each in tries if all(each.chosen.values[name] == value for name, value in values.items())]
-        return self._best_of_each([self.likelihood.refined(base, each, 0.0) for each in said or tries])[0]
+        best = self._best_of_each([self.likelihood.refined(base, each, 0.0) for each in said or tries])[0]
+        return self._refined(self.likelihood.with_effect(best))
 
     def run(self, before: M) -> Selection[M, P, F]:
         """Search on top of a fitted model."""
