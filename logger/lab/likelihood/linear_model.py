@@ -264,13 +264,20 @@ class LinearModel:
 
     def information(self, own: Sequence[Array] | None = None) -> Array:
         """Information on the car's numbers and on those of whitened columns (m, kept) per run: (p + m, p + m)."""
-        parts = list(zip(self.white, self._record_projections, strict=True))
-        if own is not None:
-            parts = [(np.vstack([white, one]), np.hstack([absorbed, mine])) for (white, absorbed), one, mine in zip(
-                parts, own, self.record_projections(own), strict=True)]
-        found = np.asarray(sum(white @ white.T - absorbed.T @ absorbed for white, absorbed in parts))
-        np.einsum("ii->i", found)[: self.count] += self.prior.precision if self.count else 0.0
-        return found
+        found = np.asarray(sum(white @ white.T - absorbed.T @ absorbed
+                               for white, absorbed in zip(self.white, self._record_projections, strict=True)))
+        found += np.diag(self.prior.precision) if self.count else 0.0
+        if own is None:
+            return found
+        mixed, alone = self.cross_products(own)
+        return np.block([[found, mixed.T], [mixed, alone]])
+
+    def cross_products(self, own: Sequence[Array]) -> tuple[Array, Array]:
+        """Products of whitened columns (m, kept) per run with those of the car's numbers (m, p), and with each other
+        (m, m)."""
+        parts = list(zip(own, self.record_projections(own), self.white, self._record_projections, strict=True))
+        return (np.asarray(sum(one @ white.T - mine.T @ absorbed for one, mine, white, absorbed in parts)),
+                np.asarray(sum(one @ one.T - mine.T @ mine for one, mine, *_ in parts)))
 
     def gradient(self, residuals: Sequence[Array], logs: Array, own: Sequence[Array] | None = None) -> Array:
         """Half of the negative gradient of the objective by the same numbers (p + m,), by whitened residuals (kept,)

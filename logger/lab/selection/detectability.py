@@ -101,8 +101,7 @@ class _Sensitivity:
         """Expected significance of an effect at its values, and the number of the car that hides it, if one does."""
         there = self._predictions((*self._state.effects, one), self._state.logs)
         white = self._linear.whitened([new - old for new, old in zip(there, self._here, strict=True)])
-        products = self._linear.information([one[None] for one in white])[-1]
-        mixed, own = products[:-1], float(products[-1])
+        (mixed,), ((own,),) = self._linear.cross_products([one[None] for one in white])
         absorbed = mixed * (self._covariance @ mixed)
         left = float(np.sqrt(max(own - float(absorbed.sum()), 0.0)))
         hidden = left < DETECTABLE_SIGMA <= np.sqrt(max(own, 0.0)) and absorbed.max(initial=0.0) > 0.5 * absorbed.sum()

@@ -305,8 +305,7 @@ def _trial_at_best_strength(base: Baseline, one: Chosen) -> Trial:
     change = partial(_change, base, [one], base.state.logs)
     white = linear.whitened(change())
     here = base.state.logs + quadratic.newton_step
-    products = linear.information([one[None] for one in white])[-1]
-    mixed, own = products[:-1], float(products[-1])
+    (mixed,), ((own,),) = linear.cross_products([one[None] for one in white])
     absorbed = quadratic.covariance @ mixed
     along = (sum(float(c @ r) for c, r in zip(white, quadratic.residuals, strict=True))
              - float(mixed @ quadratic.newton_step))
