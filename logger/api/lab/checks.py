@@ -276,9 +276,8 @@ def _other_roads(runs: SimulatedRuns, followed: _Followed, car: Car, rig: Likeli
         strangers = list(range(len(followed.around)))
     for k in strangers:
         found, run = followed.around[k], runs.runs[k]
-        if run.past is Past.FREE or (run.timed and _is_coherent(run, car)):
-            continue  # nothing drives what is let go, and its mode may lie anywhere
-        if rig is not None and rig.explains[k]:
+        # Nothing drives what is let go, and its mode may lie anywhere.
+        if run.past is Past.FREE or (rig is not None and rig.explains[k]) or (run.timed and _is_coherent(run, car)):
             continue
         what = "a record that follows its excitation" if run.timed else "a drive that follows the road of its profile"
         yield (f"{run.name}: expected {what}, found one that does not (correlation {found.correlation:.2f} around the "

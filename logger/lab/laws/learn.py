@@ -90,7 +90,7 @@ def learn(posterior: Posterior, effects: Mapping[str, Effect], families: Mapping
     ValueError where the vehicle lacks what an effect needs.
     """
     search, selection = search_effects(posterior, effects, present, progress)
-    laws = LawSearch(search, selection, families, known)
+    laws = FamilySearch(search, selection, families, known)
     law = laws.best()
     diagnosis = assess(posterior, effects, present, search, selection) if law is None else None
     verdict = tuple(selection.gains) if diagnosis is None else diagnosis.verdict
@@ -110,7 +110,7 @@ def exceeds_noise(model: Baseline) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class LawSearch:
+class FamilySearch:
     """A search among laws, after one among the known effects.
 
     refused    laws that say nothing, or less than a known effect, in the order in which they were tried
@@ -138,10 +138,9 @@ class LawSearch:
         if unexplained and now is not before and (alone is None or exceeds_noise(alone.now)):
             found.append(self._found_on(now, True))
         least = now.score - (0.0 if unexplained else DECISIVE)
-        models = [one for one in found if one is not None and one.now.score < least]
-        for one in sorted(models, key=lambda model: model.now.score)[:1]:
-            return self._law(one)
-        return None
+        best = min((one for one in found if one is not None and one.now.score < least),
+                   key=lambda one: one.now.score, default=None)
+        return None if best is None else self._law(best)
 
     def _found_on(self, base: Baseline, any_family: bool) -> Selection | None:
         """The model with a law and what else is missing beside it, sought on a model; None where no law says anything.

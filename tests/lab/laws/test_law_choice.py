@@ -11,7 +11,7 @@ import pytest
 
 from logger.lab.laws import learn
 from logger.lab.laws.draft import LEARNED
-from logger.lab.laws.learn import DECISIVE, LawSearch
+from logger.lab.laws.learn import DECISIVE, FamilySearch
 from logger.lab.laws.refusals import Refusal
 from logger.lab.selection.stepwise import Search, SearchEffort
 from logger.vehicle.effect import ForceEffect, Misalignment, chosen
@@ -94,7 +94,8 @@ class World:
         effects = {name: NamedEffect(name) for name in (*known, *related)}
         search: Any = Search([effects[name] for name in known], 0, Misalignment(1.0, 0.0), workers=1,
                              effort=SearchEffort(effects=4), likelihood=Likelihood())
-        self.laws = LawSearch(search, search.run(Model(explains=0.0)), {name: family(name) for name in laws}, effects)
+        self.laws = FamilySearch(search, search.run(Model(explains=0.0)), {name: family(name) for name in laws},
+                                 effects)
 
     def best(self) -> tuple[str, list[str], list[str]] | None:
         """The law that is chosen, the known effects beside it, and its rivals."""
