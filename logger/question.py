@@ -509,16 +509,16 @@ def help_of(question: type[Any]) -> str:
 class Answer:
     """What a command says.
 
-    told    the lines that it prints, or blocks (``logger.report.blocks.Told``); empty: none
+    content    the lines that it prints, or blocks (``logger.report.blocks.Blocks``); empty: none
     """
 
-    told: object
+    content: object
     _json: dict[str, Any] = field(repr=False)
 
     @cached_property
     def text(self) -> str:
         """The lines that it prints."""
-        return str(self.told)
+        return str(self.content)
 
     def __repr__(self) -> str:
         return self.text

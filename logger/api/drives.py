@@ -38,7 +38,7 @@ from logger.files import make_folder, together, write_text
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.question import Notify, function, silent
-from logger.report.blocks import Block, Hint, Lines, Table, Told
+from logger.report.blocks import Block, Blocks, Hint, Lines, Table
 from logger.report.quantities import known
 from logger.runs import SKIP_S, UNKNOWN, Past, past_of
 from logger.runs import Run as Record
@@ -295,8 +295,8 @@ def estimated(question: EstimateQuestion) -> Estimate:
     summary = as_json(str(drive.path), found) | checks_json(checked)
     windows = found.windows
     parts = found.road.parts if found.road else ()
-    told = Told([Lines(checks_lines(checked)), *blocks(found, summary)])
-    return Estimate(told, summary, found, summary.get("iri_m_per_km", np.nan), windows.edges_m,
+    content = Blocks([Lines(checks_lines(checked)), *blocks(found, summary)])
+    return Estimate(content, summary, found, summary.get("iri_m_per_km", np.nan), windows.edges_m,
                     windows.speed_mps, windows.iri_m_per_km, windows.iri_std_m_per_km, found.exact_m_per_km,
                     found.least_error_m_per_km, windows.flags,
                     tuple(Profile(one.start_m, one.spacing_m, one.elevation_m, None) for one in parts),

@@ -40,7 +40,7 @@ from logger.identification.unknown_car import (
 )
 from logger.printable import counted
 from logger.question import function
-from logger.report.blocks import Block, Hint, Lines, Section, Table, Told
+from logger.report.blocks import Block, Blocks, Hint, Lines, Section, Table
 from logger.runs import READING
 from logger.service.config import Config
 from logger.shipped import vehicle_names, vehicle_path
@@ -404,14 +404,14 @@ def _answer(question: LearnCarQuestion, used: Sequence[_Used], problem: UnknownC
         "kept_back": errors, "sprung_mass_kg": mass, "mass_is_convention": question.mass_kg is None,
         "converged": car.is_converged, "not_identifiable": unknown,
         "effects_missing": list(missing), "changes": moved, "other_than_settings": misfits}
-    told = Told([Lines([*_head(used, problem, seconds)]), _table(values, deviations),
+    content = Blocks([Lines([*_head(used, problem, seconds)]), _table(values, deviations),
             Hint("Usual cars: bounce at 1 to 1.5 Hz, damping ratios 0.2 to 0.4, wheel hop at 10 to 14 Hz."),
             *_iri_blocks(now, ever),
             Lines([*_kept_lines(errors), _mass_line(question, mass), *_warnings(problem, car, values, deviations),
                    *missing, *unknown, *moved, *misfits])])
     comments = "".join(f"# {line}\n".replace("# \n", "#\n") for line in [
-        f"Learnt by ridelog learn-car from {len(used)} drives, {seconds / 60:.0f} min.", *str(told).split("\n")])
-    return LearnedVehicle(told, as_json, model, values, deviations, now, ever,
+        f"Learnt by ridelog learn-car from {len(used)} drives, {seconds / 60:.0f} min.", *str(content).split("\n")])
+    return LearnedVehicle(content, as_json, model, values, deviations, now, ever,
                           tuple(_charts(problem, car)), comments)
 
 

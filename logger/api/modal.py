@@ -30,7 +30,7 @@ from logger.modal.driven_car import car_modes
 from logger.modal.mode import FoundMode, ModalResult, pole_rows
 from logger.printable import counted
 from logger.question import COMMON_IRI, COMMON_SPEED_MPS, IRI, SPEED, function
-from logger.report.blocks import Block, Lines, Section, Table, Told
+from logger.report.blocks import Block, Blocks, Lines, Section, Table
 from logger.report.quantities import known
 from logger.runs import READING, SKIP_S
 from logger.store.formats import record_checks
@@ -104,7 +104,7 @@ def _modes_by(found: Found, name: str) -> Modes:
         np.array([getattr(one, column) for one in many], dtype=np.float64)
         for column in ("frequency_hz", "frequency_std_hz", "damping_ratio", "damping_std"))
     return Modes(
-        Told(blocks(result, kept, name)), as_json(result, kept, found.method), kept.names, frequency_hz,
+        Blocks(blocks(result, kept, name)), as_json(result, kept, found.method), kept.names, frequency_hz,
         frequency_std_hz, damping_ratio, damping_std,
         np.array([one.shape for one in many], dtype=np.complex128).reshape(len(many), len(kept.names)),
         tuple((one.frequency_hz, one.reason) for one in result.rejected), result.how, result.order, pole_rows(result))
@@ -154,8 +154,8 @@ def vehicle_modes(
                np.array([one.damping_ratio for one in found]), damping_std)
     at = f", at {speed_mps:g} m/s on a road of {iri_m_per_km:g} m/km" if known.depends_on_motion else ""
     rows = list(zip(*(one.tolist() for one in columns), strict=True))
-    told = Told([Lines([f"{model.vehicle.name}{at}"]), Table(_HEADS, list(_mode_rows(rows)))])
-    return VehicleModes(told, {"modes": [_mode_json(*row) for row in rows]}, *columns)
+    content = Blocks([Lines([f"{model.vehicle.name}{at}"]), Table(_HEADS, list(_mode_rows(rows)))])
+    return VehicleModes(content, {"modes": [_mode_json(*row) for row in rows]}, *columns)
 
 
 def found_modes(given: record_checks.ChannelRecord | Path | str, question: ModesQuestion) -> Found:

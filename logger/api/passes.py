@@ -25,7 +25,7 @@ from logger.left_out import left_out_json, left_out_lines
 from logger.printable import counted
 from logger.question import function
 from logger.records import WindowRecord
-from logger.report.blocks import Block, Hint, Lines, Linked, Section, Table, Told, elements
+from logger.report.blocks import Block, Blocks, Hint, Lines, Linked, Section, Table, elements
 from logger.report.document import Html, hint, map_links, section
 from logger.report.page import number_button, page
 from logger.report.placed import column, iri_errors, of_passes, placed, trace_of
@@ -118,7 +118,7 @@ def combined(question: PassesQuestion) -> RepeatedDrives:
                             None if split_us is None else split_us / US_PER_S)
     left = of_passes(files, records, found.placed)
     return RepeatedDrives(
-        Told([*blocks(found), Lines(left_out_lines(left))]), as_json(found) | left_out_json(left),
+        Blocks([*blocks(found), Lines(left_out_lines(left))]), as_json(found) | left_out_json(left),
         found.iri.drives, found.iri.iri_m_per_km, found.iri.iri_std_m_per_km,
         found.a_w_mps2, found.lat_deg, found.lon_deg, found.heading_deg, found)
 

@@ -33,7 +33,7 @@ from logger.dsp.weightings.weighting import Weighting
 from logger.errors import BadInput
 from logger.plugins import catalogue
 from logger.question import function
-from logger.report.blocks import Block, Lines, Table, Told
+from logger.report.blocks import Block, Blocks, Lines, Table
 from logger.report.quantities import known
 from logger.runs import UNKNOWN, RecordFacts
 from logger.store.formats import drive_file, record_file
@@ -157,8 +157,8 @@ def comfort_of(question: ComfortQuestion) -> Comfort:
         hint = f" (--resample takes {LEAST_TAKEN_HZ:g} or more)" if can_be_laid else ""
         raise BadInput(f"{name}: {error}{hint}") from None
     summary, vertical = as_json(found) | checks_json(ride), found.vertical
-    told = Told([*blocks(found, Path(name).name), Lines(checks_lines(ride))])
-    return Comfort(told, summary, used.name,
+    content = Blocks([*blocks(found, Path(name).name), Lines(checks_lines(ride))])
+    return Comfort(content, summary, used.name,
                    vertical.a_w_mps2, vertical.mtvv_mps2, vertical.vdv_mps175, vertical.crest_factor,
                    summary["comfort"], found.weighted_mps2, ride.rate_hz,
                    tuple(doubt.words for doubt in ride.doubts))

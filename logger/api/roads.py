@@ -14,7 +14,7 @@ from logger.api.shown import CommandResult, Shown, table
 from logger.chart_data import Array, Chart, Curves, Line, line
 from logger.errors import BadInput
 from logger.question import function
-from logger.report.blocks import Block, Lines, Table, Told, area_blocks
+from logger.report.blocks import Block, Blocks, Lines, Table, area_blocks
 from logger.report.quantities import area_values, measured
 from logger.report.summary import IRI_CLASSES
 from logger.roads import elevation_spectrum, iso8608
@@ -161,14 +161,14 @@ def iri_of(question: IriQuestion) -> Iri:
     ends_m = [0.0, *(window.distance_end_m for window in found.windows)]
     shown = found.columns.get("mri_m_per_km", found.columns["iri_m_per_km"])
     whole = found.row(0)
-    told, values = iri_blocks(found, road, Path(name).name), iri_json(found, road)
+    content, values = iri_blocks(found, road, Path(name).name), iri_json(found, road)
     rough: tuple[Area, ...] = ()
     if localized_m_per_km is not None:
         middle_m, sliding = continuous_iri(road.elevation_m, road.elevation_right_m, road.spacing_m, WINDOW_M)
         rough = tuple(areas(road.start_m + middle_m, sliding, localized_m_per_km))
-        told += area_blocks(rough, localized_m_per_km)
+        content += area_blocks(rough, localized_m_per_km)
         values |= {"localized": [area_values(one) for one in rough]}
-    return Iri(Told(told), values, whole["iri_m_per_km"],
+    return Iri(Blocks(content), values, whole["iri_m_per_km"],
                whole.get("iri_right_m_per_km"), whole.get("mri_m_per_km"), whole.get("hri_m_per_km"),
                road.start_m + np.array(ends_m), shown[1:], road, rough)
 

@@ -24,7 +24,7 @@ from logger.left_out import left_out_json, left_out_lines
 from logger.printable import counted
 from logger.question import function
 from logger.records import WindowRecord
-from logger.report.blocks import Block, Lines, Section, Table, Told, area_blocks
+from logger.report.blocks import Block, Blocks, Lines, Section, Table, area_blocks
 from logger.report.placed import column, iri_errors, of_sections, placed, trace_of
 from logger.report.quantities import UNITS, DisplayUnits, area_values, known
 from logger.report.summary import counts, expected_square
@@ -103,7 +103,7 @@ def sections_of(question: SectionsQuestion) -> Sections:
     known_m, iri, std, a_w, speed_mps = (_joined([getattr(one, name) for one in figures]) for name in (
         "known_m", "iri_m_per_km", "iri_std_m_per_km", "a_w_mps2", "speed_mps"))
     return Sections(
-        Told([*blocks(drives, length_m, units, localized_m_per_km), Lines(left_out_lines(left))]),
+        Blocks([*blocks(drives, length_m, units, localized_m_per_km), Lines(left_out_lines(left))]),
         as_json(drives, length_m, localized_m_per_km) | left_out_json(left), length_m,
         np.repeat(np.arange(len(drives)), [len(one.condition) for one in drives]),
         _joined([one.edges_m[:-1] for one in figures]), _joined([one.ends_m for one in drives]), known_m, iri, std, a_w,

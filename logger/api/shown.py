@@ -66,10 +66,10 @@ class CommandResult(Answer, Shown):
         return page(self.title, of, [*self.blocks(), Section("Pictures", self.charts())])
 
     def blocks(self) -> Iterable[Block]:
-        """What is told."""
-        from logger.report.blocks import Lines, Told
+        """Its content as blocks."""
+        from logger.report.blocks import Blocks, Lines
 
-        return self.told if isinstance(self.told, Told) else [Lines([one]) for one in self.text.split("\n\n")]
+        return self.content if isinstance(self.content, Blocks) else [Lines([one]) for one in self.text.split("\n\n")]
 
     def write(self, path: Path, option: str = "--out") -> None:
         """Write it as the file that an ``option`` of its command asks for: of its own kind where it has one, else its

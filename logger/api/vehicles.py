@@ -21,7 +21,7 @@ from logger.files import write_text
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.question import function
-from logger.report.blocks import Block, Lines, Table, Told
+from logger.report.blocks import Block, Blocks, Lines, Table
 from logger.report.quantities import numbers_of, unit_of
 from logger.runs import Past, past_of
 from logger.service.signal_chain import recorder_gain
@@ -285,7 +285,7 @@ def calibration_of(question: CalibrateQuestion) -> Calibration:
     found = calibrated(vehicle if isinstance(vehicle, Model) else vehicle_file.read_model(str(path)), path, question)
     speeds = found.speeds
     return Calibration(
-        Told(blocks(found)), as_json(found), found, np.array([one.speed_mps for one in speeds]),
+        Blocks(blocks(found)), as_json(found), found, np.array([one.speed_mps for one in speeds]),
         *(_slopes(speeds, name) for name in (
             "iri_per_accel_rms", "window_iri_per_accel_rms", "accel_rms_per_root_gd", "a_w_per_iri")))
 

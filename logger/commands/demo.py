@@ -361,8 +361,8 @@ def _judged(folder: Path, vehicle: str, title: str, why: str, commands: _Command
         drive = _run(folder)
         found = assessed(drive, read_model(vehicle_path(vehicle)), *sensor_of(drive), WINDOW_M)
     # Of what is printed: the mean, and the table's head, last row and remark.
-    told = list(blocks(found, as_json(str(folder), found)))
-    answer, table, remark = (next(one for one in told if isinstance(one, kind)) for kind in (Lines, Table, Hint))
+    content = list(blocks(found, as_json(str(folder), found)))
+    answer, table, remark = (next(one for one in content if isinstance(one, kind)) for kind in (Lines, Table, Hint))
     assert isinstance(answer, Lines) and isinstance(table, Table)
     tell([text([Lines(answer.lines[:1]), replace(table, rows=table.rows[-1:]), remark])])
     return found

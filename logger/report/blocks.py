@@ -1,7 +1,7 @@
-"""An answer as a list of blocks, told once: lines of a terminal and a page are made of the same.
+"""An answer as a list of blocks, written once: lines of a terminal and a page are made of the same.
 
-Problem: what an answer says was told as text and again as a page, and the two came apart. Solution: sentences, tables,
-pictures and sections of them in a list; what is HTML already, and pictures, are for the page alone.
+Problem: what an answer says was written as text and again as a page, and the two came apart. Solution: sentences,
+tables, pictures and sections of them in a list; what is HTML already, and pictures, are for the page alone.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ Block = str | doc.Html | Lines | Bullets | Hint | Table | Section | Chart | Step
 """A ``str`` that is no HTML is a sentence, or some."""
 
 
-class Told(tuple[Block, ...]):
+class Blocks(tuple[Block, ...]):
     """The blocks of an answer; as ``str`` what a terminal shows."""
 
     def __str__(self) -> str:
@@ -90,10 +90,14 @@ class Told(tuple[Block, ...]):
 
 def text(blocks: Iterable[Block]) -> str:
     """What a terminal shows: sentences follow each other, all else has a blank line around it."""
+    return _joined([(one, _lines(one)) for one in blocks])
+
+
+def _joined(rendered: Iterable[tuple[Block, str]]) -> str:
     said: list[str] = []
     was_sentence = False
-    for one in blocks:
-        if lines := _lines(one):
+    for one, lines in rendered:
+        if lines:
             is_sentence = isinstance(one, str)
             said += ["", lines] if said and not (is_sentence and was_sentence) else [lines]
             was_sentence = is_sentence
@@ -113,11 +117,13 @@ def _lines(one: Block) -> str:
         return wrapped(one.lines, "- ")
     if isinstance(one, Table):
         return _table_lines(one)
-    return f"{one.title}:\n{text(one.blocks)}" if any(map(_lines, _without_hints(one))) else ""
+    rendered = [(block, _lines(block)) for block in one.blocks]
+    return f"{one.title}:\n{_joined(rendered)}" if _says_something(rendered) else ""
 
 
-def _without_hints(one: Section) -> list[Block]:
-    return [block for block in one.blocks if not isinstance(block, Hint)]
+def _says_something(rendered: Iterable[tuple[Block, str]]) -> bool:
+    """Whether blocks show more than hints."""
+    return any(shown for block, shown in rendered if not isinstance(block, Hint))
 
 
 def _table_lines(one: Table) -> str:
@@ -152,7 +158,9 @@ def _element(one: Block) -> doc.Html:
         shown = _filled(one.heads, [[getattr(cell, "html", cell) for cell in row] for row in one.rows], one.words)
         return doc.grid(shown.heads, shown.rows, shown.words) if one.rows else doc.EMPTY
     if isinstance(one, Section):
-        return doc.section(one.title, elements(one.blocks) if elements(_without_hints(one)) else "")
+        rendered = [(block, _element(block)) for block in one.blocks]
+        return doc.section(one.title, doc.concatenated(shown for _, shown in rendered) if _says_something(rendered)
+                           else "")
     if isinstance(one, str):
         return one if isinstance(one, doc.Html) else doc.paragraphs([one])
     return chart(one)

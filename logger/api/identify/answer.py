@@ -57,7 +57,7 @@ from logger.lab.readings_fit import ReadingsFit, fit_to_readings
 from logger.left_out import LeftOut, left_out_json, left_out_lines
 from logger.profiles.track import Track
 from logger.question import function
-from logger.report.blocks import Lines, Table, Told
+from logger.report.blocks import Blocks, Lines, Table
 from logger.report.quantities import known as known_number
 from logger.report.quantities import measured, unit_of
 from logger.runs import Run as Record
@@ -253,12 +253,12 @@ def _on_measured_roads(given: Model, records: list[Record], question: IdentifyQu
     fit = (common := with_common_roughness(model, found.fit)).fit
     low = "" if fit.low_pass.cutoff_hz is None else f", below {fit.low_pass.cutoff_hz:g} Hz"
     lines = [_in_words_of(records, one) for one in measured_lines(fit, *checks)]
-    told = Told([Lines([*_first_lines(fit, _head(given, len(fit.free), records, low),
+    content = Blocks([Lines([*_first_lines(fit, _head(given, len(fit.free), records, low),
                                  "rms(measured - model) / rms(measured)")]),
             _table(fit, fit.free), Lines([*lines, *common_words(model, common), *record_words(found)]),
             Lines(left_out_lines(_beside_beginnings(records)))])
     return Identification(
-        told, measured_json(fit, *checks) | record_json(found, common, records)
+        content, measured_json(fit, *checks) | record_json(found, common, records)
         | left_out_json(runs_left_out(records)), fit, model_of(_fitted(given, model, fit)),
         tuple(_in_words_of(records, one) for one in doubts(fit, *checks)))
 
@@ -443,12 +443,12 @@ def _on_unmeasured_roads(given: Model, records: list[Record], question: Identify
     fitted = car.vehicle_with(np.array(list(fit.parameters.values())))
     model = vehicle_file.CarModel(fitted, errors=_road_fit_errors(fit),
                                   given=given.given or given.vehicle, known=given.known)
-    told = Told([Lines([*_first_lines(fit, _head(given, len(parameters), records, f"; over {where}", ","),
+    content = Blocks([Lines([*_first_lines(fit, _head(given, len(parameters), records, f"; over {where}", ","),
                                  "rms(residual) / rms(measured) over the most probable road")]),
             _table(fit, parameters), Lines([*unmeasured_lines(fit, parameters)]),
             Lines(left_out_lines(_beside_beginnings(records)))])
     return Identification(
-        told, {**unmeasured_json(fit, parameters), "runs": [record.name for record in records],
+        content, {**unmeasured_json(fit, parameters), "runs": [record.name for record in records],
                           **left_out_json(runs_left_out(records))}, fit, model_of(model),
         tuple(finding.words for finding in fit.verdict))
 

@@ -34,7 +34,7 @@ from logger.left_out import left_out_json, left_out_lines
 from logger.printable import counted
 from logger.question import function
 from logger.report import document as doc
-from logger.report.blocks import Block, Bullets, Detail, Hint, Linked, Section, Table, Told, page
+from logger.report.blocks import Block, Blocks, Bullets, Detail, Hint, Linked, Section, Table, page
 from logger.report.charts import chart
 from logger.report.quantities import chance, finite, known, numbers_of, signal_errors, unit_of
 from logger.runs import Run, are_on_rig, normalised_rms_error, runs_left_out, short_names
@@ -95,7 +95,7 @@ compare = function("compare", CompareQuestion, compared)
 def comparison_of(found: LabComparison) -> Comparison:
     """What the lab found, as it is shown."""
     summary = comparison_json(found)
-    return Comparison(Told(comparison_blocks(found)), summary, found, found.plain.error, found.steps[-1].error,
+    return Comparison(Blocks(comparison_blocks(found)), summary, found, found.plain.error, found.steps[-1].error,
                       {one["run"]: one["error"] for one in summary["runs"]}, tuple(summary["evidence"]))
 
 
@@ -192,7 +192,7 @@ def asked_for(text: str, bench: Bench, question: AddEffectQuestion | LabQuestion
 def addition_of(found: AddedEffects, model: Model) -> AddedEffect:
     """What the lab found, as it is shown; the model with it."""
     return AddedEffect(
-        Told(addition_blocks(found)), addition_json(found), found, *_as_one(found.new),
+        Blocks(addition_blocks(found)), addition_json(found), found, *_as_one(found.new),
         found.error_before, found.error_refitted, found.error_after, found.noise_floor_error, found.p_value,
         found.helps, tuple(found.moved), model)
 

@@ -40,7 +40,7 @@ from logger.printable import percent
 from logger.profiles.track import Track
 from logger.question import Notify, function, silent
 from logger.report import document as doc
-from logger.report.blocks import Block, Bullets, Detail, Hint, Section, Table, Told, page
+from logger.report.blocks import Block, Blocks, Bullets, Detail, Hint, Section, Table, page
 from logger.report.charts import chart
 from logger.report.quantities import chance, enumerated, finite, measured, numbers_of, signal_errors, unit_of, wrapped
 from logger.runs import BY_RECEIVER, UNKNOWN, runs_left_out
@@ -126,11 +126,11 @@ def diagnosis_of(found: LabDiagnosis, bench: Bench, most: int | None = None, nex
                  ) -> Diagnosis:
     """What the lab found on a bench, as it is shown; ``most`` so many candidates, None: all."""
     left_out = runs_left_out(bench.runs.runs)
-    told = Told([*diagnosis_blocks(found, most), *map(Hint, [_compared(bench), *left_out_lines(left_out)])])
+    content = Blocks([*diagnosis_blocks(found, most), *map(Hint, [_compared(bench), *left_out_lines(left_out)])])
     errors = {one.effect.name: one.standard_errors for one in found.missing}
     candidates = tuple(Candidate(one.effect.name, dict(one.values), dict(errors.get(one.effect.name, {})), one.error,
                                  one.p_value, tuple(one.confused_with)) for one in found.candidates)
-    return Diagnosis(told, diagnosis_json(found) | left_out_json(left_out), found, found.baseline_error,
+    return Diagnosis(content, diagnosis_json(found) | left_out_json(left_out), found, found.baseline_error,
                      found.noise_floor_error, candidates, found.verdict, found.unexplained,
                      tuple((one.words, one.error) for one in found.steps), bench.model.vehicle.name, next_command)
 
@@ -210,7 +210,7 @@ def _diagnosed_same_road(question: DiagnoseQuestion) -> SameRoadDiagnosis:
     summary = same_road_json(found)
     most = None if question.list_all else _SHOWN
     return SameRoadDiagnosis(
-        Told(same_road_blocks(found, names, most)), summary, found, summary["baseline_error"],
+        Blocks(same_road_blocks(found, names, most)), summary, found, summary["baseline_error"],
         summary["noise_floor_error"], tuple(
             Candidate(one["effect"], one["parameters"], one["standard_errors"], one["error"], one["p_value"],
                       tuple(one["confused_with"])) for one in summary["candidates"]),

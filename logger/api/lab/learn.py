@@ -27,7 +27,7 @@ from logger.lab.selection.add_effect import AddedEffects, add
 from logger.lab.selection.holdout import JUDGED_ON, ErrorStep
 from logger.plugins import catalogue
 from logger.question import Notify, function, silent
-from logger.report.blocks import Block, Bullets, Detail, Hint, Section, Table, Told, page
+from logger.report.blocks import Block, Blocks, Bullets, Detail, Hint, Section, Table, page
 from logger.report.charts import chart
 from logger.report.document import Html, tiles
 from logger.report.quantities import finite, measured, numbers_of, unit_of
@@ -112,7 +112,7 @@ def law_of(question: LearnQuestion) -> LearnedLaw:
     drawn = picture_of(found)
     steps = tuple((one["step"], one["error"]) for one in summary["steps"])
     return LearnedLaw(
-        Told(law_blocks(found)), summary, found, bench.model.vehicle.name,
+        Blocks(law_blocks(found)), summary, found, bench.model.vehicle.name,
         summary["family"], summary["words"], source_of(found.learning, found.addition), summary["parameters"],
         summary["standard_errors"], summary["error_before"], summary["error_after"], summary["error_after_unseen"],
         summary["noise_floor_error"], tuple(summary["verdict"]), () if drawn is None else (drawn,), steps)

@@ -33,7 +33,7 @@ from logger.lab.selection.holdout import JUDGED_ON
 from logger.lab.session import LawSearch, Round, Story
 from logger.question import Notify, function
 from logger.report import document as doc
-from logger.report.blocks import Block, Bullets, Hint, Section, Table, Told, page, text
+from logger.report.blocks import Block, Blocks, Bullets, Hint, Section, Table, page, text
 from logger.report.charts import chart
 from logger.report.maps import MapLine, ways_map
 from logger.report.quantities import wrapped
@@ -157,7 +157,7 @@ def walk(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progress, exp
     models = Table(("Model", "Error"), [(words, f"{error:.3f}") for words, error in steps(story)])
     summary = as_json(story) | {"story": str(out / STORY)}
     return LabStory(
-        Told([models, *ending(story)]), summary, story,
+        Blocks([models, *ending(story)]), summary, story,
         model_of(model), comparing.comparison_of(story.first),
         tuple(diagnosing.diagnosis_of(one, given) for one in story.diagnoses),
         tuple(comparing.addition_of(one.addition, read_vehicle(one.file)) for one in story.rounds),

@@ -32,7 +32,7 @@ from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.profiles.track import Track
 from logger.question import function
 from logger.report import document as doc
-from logger.report.blocks import Block, Bullets, Detail, Hint, Section, Table, Told, page
+from logger.report.blocks import Block, Blocks, Bullets, Detail, Hint, Section, Table, page
 from logger.runs import Past, Run
 from logger.store.formats import drive_file, profile_file, vehicle_file
 
@@ -115,7 +115,7 @@ plan = function("plan", PlanQuestion, plan_by)
 def plan_of(found: LabPlan, vehicle: str) -> Plan:
     """What the lab found, as it is shown."""
     summary = as_json(found)
-    return Plan(Told(plan_blocks(found)), summary, found, vehicle, summary["detectability"],
+    return Plan(Blocks(plan_blocks(found)), summary, found, vehicle, summary["detectability"],
                 summary["isolability"], tuple(map(tuple, found.groups)),
                 tuple(NextDrive(do_words(one.option), dict(one.gains), one.more_named) for one in found.next),
                 summary["noise_mps2"])
