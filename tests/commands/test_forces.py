@@ -177,8 +177,9 @@ def test_a_hardening_spring_under_a_force_is_what_the_integrator_says(tmp_path: 
     assert ridelog.compare(tmp_path / "bench.yaml", [run]).error > 0.1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("bench", [
-    Bench(0.3, 2000.0, 4.0, play_m=5.7e-4), *slow(Bench(2.45, 980.0, 12.0, wheel=1.0, tire=6300.0, play_m=5.7e-4))])
+    Bench(0.3, 2000.0, 4.0, play_m=5.7e-4), Bench(2.45, 980.0, 12.0, wheel=1.0, tire=6300.0, play_m=5.7e-4)])
 def test_a_spring_with_play_in_its_seat_is_what_the_integrator_says(
         bench: Bench, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """And the play is found where the file says another stiffness and no play."""
@@ -201,8 +202,9 @@ FRICTION = "{name: frame_friction, friction_force_n: 0.8, transition_velocity_m_
 DRAG = "{name: frame_damping, body_damping_n_s_per_m: 3}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("hidden", [
-    {"guide_n": 0.8}, {"guide_drag": 3.0}, *slow({"guide_n": 0.8, "guide_drag": 3.0})])
+    {"guide_n": 0.8}, {"guide_drag": 3.0}, {"guide_n": 0.8, "guide_drag": 3.0}])
 def test_a_mass_that_goes_along_a_guide_on_the_ground_is_what_the_integrator_says(
         hidden: dict[str, float], tmp_path: Path) -> None:
     bench, base, push = Bench(1.2, 900.0, 4.0, **hidden), noise(12.0, 0.001, 5), noise(12.0, 0.5, 6)
@@ -360,6 +362,7 @@ def test_uneven_clocks_are_laid_on_even_times_and_nothing_is_compared_beyond_the
     assert not_driven == ([pytest.approx(12.0 - excitation_ends_s, abs=0.02)] if excitation_ends_s < 12 else [])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("fault", "jitter", "lost", "why"), [
     ("gaps", 0.0, 102, "without a reading"), ("gaps", 0.3, 102, "without a reading"),
     ("clipped", 0.0, 0.09 * len(TIME_S), "at an end of the sensor's range, but as bounds")])
@@ -404,7 +407,8 @@ def test_a_record_that_is_mostly_clipped_or_mostly_not_there_is_refused(tmp_path
         ridelog.compare(tmp_path / "bench.yaml", [run])
 
 
-@pytest.mark.parametrize("damping", ["1500 +- 50%", pytest.param("unknown", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("damping", ["1500 +- 50%", "unknown"])
 def test_the_mass_of_a_fixture_is_told_from_an_early_force(damping: str, tmp_path: Path,
                                                            capsys: pytest.CaptureFixture[str]) -> None:
     """3 kg between the load cell and a damper; then, in the same file, a mass that nobody asks for."""
@@ -425,6 +429,7 @@ def test_the_mass_of_a_fixture_is_told_from_an_early_force(damping: str, tmp_pat
               str(run)])
 
 
+@pytest.mark.slow
 def test_the_low_pass_of_a_load_cell_is_found(tmp_path: Path) -> None:
     """A damper beside a spring, and an amplifier of first order with 5 ms, by their equations."""
     way = noise(12.0, 0.01, 6)
@@ -439,6 +444,7 @@ def test_the_low_pass_of_a_load_cell_is_found(tmp_path: Path) -> None:
     assert found.error_after < 0.02 < 0.1 < found.error_refitted
 
 
+@pytest.mark.slow
 def test_play_of_a_part_that_moves_by_some_gaps_is_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     way = noise(3.0, 0.003, 6)
     x_m = way(TIME_S)
@@ -488,7 +494,8 @@ def test_a_circuit_of_tiny_numbers_is_named_a_hardening_spring(tmp_path: Path, c
     assert best["parameters"]["cubic_stiffness_n_per_m3"] == pytest.approx(30.0, rel=0.1)
 
 
-@pytest.mark.parametrize("holds", [1.6, *slow(1.0)])
+@pytest.mark.slow
+@pytest.mark.parametrize("holds", [1.6, 1.0])
 def test_how_much_more_friction_holds_than_it_rubs_is_found_where_it_does(holds: float, tmp_path: Path) -> None:
     true = Bench(1.2, 900.0, 4.0, guide_n=0.8, holds=holds)
     push = noise(12.0, 1.5, 6)
@@ -503,7 +510,8 @@ def test_how_much_more_friction_holds_than_it_rubs_is_found_where_it_does(holds:
     assert found.error_after < 0.02
 
 
-@pytest.mark.parametrize("quadratic", [-5e3, *slow(0.0)])
+@pytest.mark.slow
+@pytest.mark.parametrize("quadratic", [-5e3, 0.0])
 def test_a_spring_that_is_stiffer_to_one_side_is_found_where_it_is(quadratic: float, tmp_path: Path) -> None:
     """As an air spring is: of a part, by its equation alone."""
     way = noise(3.0, 0.02, 6)
@@ -518,6 +526,7 @@ def test_a_spring_that_is_stiffer_to_one_side_is_found_where_it_is(quadratic: fl
     assert found.parameters["quadratic_stiffness_n_per_m2"] == pytest.approx(quadratic, rel=0.02, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_the_zero_of_the_force_on_a_hardening_spring_is_found(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A spring that is not linear works around another place under a force that is there all the time."""
@@ -536,6 +545,7 @@ def test_the_zero_of_the_force_on_a_hardening_spring_is_found(
     assert found["error_after"] < 0.3 * found["error_before"]
 
 
+@pytest.mark.slow
 def test_an_orifice_and_a_coil_that_saturates_are_found(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The first of them is in the vehicle's file; the other is added, and all of the motion is explained."""
@@ -580,6 +590,7 @@ def test_a_short_test_of_a_part_is_taken_whole(tmp_path: Path, capsys: pytest.Ca
     assert found["runs"][0]["samples"] == pytest.approx(whole.sum() - 25, abs=1)
 
 
+@pytest.mark.slow
 def test_what_a_part_pulls_back_with_at_rest_is_found_beside_its_friction(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Its file says a damper and no preload; the numbers are those of its equation, and all of its force is explained.
@@ -649,6 +660,7 @@ def test_a_force_that_gives_before_it_slides_is_no_delay(slides_n: float, late_s
     assert "natural frequencies" not in said and "drive one bump" not in said
 
 
+@pytest.mark.slow
 def test_a_record_follows_its_force_though_the_vehicles_mode_lies_elsewhere(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A rig that rings at 8 Hz (damping ratio 0.8 %), its spring 60 % too stiff in the file; then under a force that
@@ -667,6 +679,7 @@ def test_a_record_follows_its_force_though_the_vehicles_mode_lies_elsewhere(
         main(["compare", "--vehicle", vehicle, runs[1]])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("read", "pushed", "words"), [
     (1 / 9.80665, 1.0, r"0\.10\d times .* it looks like accel_z_mps2 in g \("),
     (1.0, 1e-3, r"found accel_z_mps2 9\d\d times .* it looks like accel_z_mps2 in mm/s2 or force_n in kN \("),
@@ -695,6 +708,7 @@ def test_a_number_far_from_what_its_file_knows_is_named(tmp_path: Path, capsys: 
         "".join(capsys.readouterr()).split())
 
 
+@pytest.mark.slow
 def test_the_noise_of_what_drives_a_rig_is_in_the_errors_of_its_numbers(tmp_path: Path) -> None:
     """The resonance makes more of it than of all other noise: by the residual's level alone the errors of spring and
     damper over the mass would be a quarter. (The scale of all three is that of the sensor.)"""
@@ -715,6 +729,7 @@ def test_the_noise_of_what_drives_a_rig_is_in_the_errors_of_its_numbers(tmp_path
     assert np.sqrt(np.mean(np.square(off))) < 2.0
 
 
+@pytest.mark.slow
 def test_two_effects_are_added_together(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Either alone is biased, and it is said that more is missing."""
     way = noise(8.0, 0.004, 6)
@@ -750,6 +765,7 @@ def test_the_zeros_of_sensors_are_in_no_error(tmp_path: Path, capsys: pytest.Cap
     assert errors[1] == pytest.approx(errors[0], rel=1e-3) and errors[1] < 0.01
 
 
+@pytest.mark.slow
 def test_another_unit_of_another_signal_is_said(tmp_path: Path) -> None:
     """Its spring a third too soft in the file; a gain of two is no unit."""
     bench, push, seen = ringing(6.0)
@@ -801,6 +817,7 @@ def identified(capsys: pytest.CaptureFixture[str], vehicle: Path, run: Path, *mo
     return dict(json.loads(capsys.readouterr().out))
 
 
+@pytest.mark.slow
 def test_what_a_file_does_not_know_is_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Of a spring with 37 N of preload, and of no damper at all: none within its standard error."""
     way = noise(8.0, 0.004, 6)
@@ -822,6 +839,7 @@ def test_what_a_file_does_not_know_is_found(tmp_path: Path, capsys: pytest.Captu
         main(["identify", "--vehicle", str(part), str(run)])
 
 
+@pytest.mark.slow
 def test_no_size_is_seen_in_accelerations_of_a_mass_that_little_damps(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """13 t, 12 in its file: all that is found of it is 8 % too small."""
@@ -871,6 +889,7 @@ def test_the_shortest_test_of_a_part_is_compared_at_any_rate(rate_hz: int, tmp_p
     assert refitted["shifts"]["damping_n_s_per_m"] == pytest.approx(-1 / 3, abs=0.02)
 
 
+@pytest.mark.slow
 def test_whether_a_record_of_two_signals_follows_its_force_is_seen_in_the_first(tmp_path: Path) -> None:
     """The vehicle's mode lies elsewhere; then under a force that was another test's."""
     _, push, moved = ringing(0.6)

@@ -70,6 +70,7 @@ def test_what_is_let_go_from_the_same_place_repeats(tmp_path: Path, from_m: floa
     assert ("one and two are repeats" in " ".join(said.replace(f"{tmp_path}/", "").split())) is repeats
 
 
+@pytest.mark.slow
 def test_a_mode_that_is_too_sharp_to_be_met_by_chance_is_found(tmp_path: Path) -> None:
     """A leaf of steel, damping ratio 0.08 %, as the textbook has it; nobody knows its spring."""
     time_s, omega, runs = np.arange(0, 12, 0.005), 2 * np.pi * 12.55, []

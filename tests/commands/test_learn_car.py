@@ -60,6 +60,7 @@ def test_the_file_is_a_vehicle_whose_errors_the_box_can_use(learned: tuple[dict[
     assert "Spectra at" in page.read_text() and "<svg" in page.read_text()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("wrong_m", [2.66 * 1.1, *slow(2.66 * 0.9)])
 def test_a_wrong_wheelbase_is_named(runs: list[Path], wrong_m: float) -> None:
     found = called("learn-car", *runs, "--wheelbase", wrong_m)
@@ -190,6 +191,7 @@ def _logged(folder: Path, number: int, run: Path, vehicle: str = "generic") -> N
     log.close()
 
 
+@pytest.mark.slow
 def test_sidecars_of_logs_do_for_drives_and_a_vehicle_that_is_not_the_car_is_found_out(
         runs: list[Path], learned: tuple[dict[str, Any], Path, Path], tmp_path: Path) -> None:
     for number, run in enumerate(runs, 1):
