@@ -267,13 +267,13 @@ class NmeaDecoder:
         day = self._too_early_us // DAY_US
         turns = -(-(self._earliest_utc_us - self._too_early_us) // (ROLLOVER_DAYS * DAY_US))
         rollovers = self._added_us // (ROLLOVER_DAYS * DAY_US) + turns
-        wrong = f"it says that it is {_words_of(day)}, before the settings' earliest_date, so no row has a date"
+        wrong = f"its date is {_words_of(day)}, before gps.earliest_date in the settings, so no row has a date"
         counted_days = day - self._added_us // DAY_US - GPS_EPOCH_DAY
         if rollovers > ROLLOVERS_MAX or counted_days < 0 or counted_days % ROLLOVER_DAYS < DAYS_OF_WEEK:
             return f"{wrong}: give its antenna a free view of the sky, or replace it"
-        return (f"{wrong}: a receiver counts 1024 weeks and begins again. Under gps in the settings, set "
-                f"week_rollovers: {rollovers}, if today is about {_words_of(day + turns * ROLLOVER_DAYS)}, or "
-                "earliest_date, if the date is right; or renew its firmware")
+        return (f"{wrong}. If the date is right, change earliest_date. If today is about "
+                f"{_words_of(day + turns * ROLLOVER_DAYS)}, its week counter wrapped after 1024 weeks: set "
+                f"gps.week_rollovers: {rollovers}, or renew its firmware")
 
     @property
     def counts(self) -> dict[str, int]:

@@ -292,9 +292,10 @@ def _summary(found: CombinedDrives) -> Iterator[str]:
                "(tires, load, temperature)")
 
 
-_VISIT_HEADS = ("#", "What", "Worst piece at", "Towards", "Length [m]", "IRI [m/km]", "a_w [m/s²]",
+_VISIT_HEADS = ("Place", "What", "Worst piece at", "Towards", "Length [m]", "IRI [m/km]", "a_w [m/s²]",
                 "Perception", "Confidence", "Drives")
-_CHANGE_HEADS = ("#", "Change", "Coordinates", "Towards", "Change of the IRI [m/km]", "p", "Drives before", "after")
+_CHANGE_HEADS = ("Place", "Change", "Coordinates", "Towards", "Change of the IRI [m/km]", "p-value", "Drives before",
+                 "after")
 
 
 def _place(found: CombinedDrives, cell: int) -> Linked:
@@ -327,8 +328,9 @@ def _change_cells(found: CombinedDrives, change: Changes, one: int, cell: int) -
 def _change_blocks(found: CombinedDrives, change: Changes) -> Iterator[Block]:
     """What changed between two periods: how much of the road, and the largest changes."""
     if not len(change.key):
-        yield ("No change can be measured: no piece of road was passed in both periods; rows without a date are in "
-               "neither.")
+        before, after = change.drives
+        yield (f"No change can be measured: no piece of road was passed in both periods (drives before the date: "
+               f"{before}, from then on: {after}, without a date: {found.drives - before - after}).")
         return
     words = [changed(change, one) for one in range(len(change.key))]
     worse, better = words.count("worse"), words.count("better")
@@ -340,6 +342,7 @@ def _change_blocks(found: CombinedDrives, change: Changes) -> Iterator[Block]:
     yield Table(_CHANGE_HEADS, [
         (place_number(found, cells[one]), words[one], _place(found, cells[one]),
          *_change_cells(found, change, one, cells[one])) for one in largest_changes(change)], (0, 1, 2, 3))
+    yield Hint("Place: its number in the work list, which combines both periods.")
 
 
 def changed(change: Changes, one: int) -> str:

@@ -3,18 +3,20 @@
 The drive is simulated: a half car over generated roads, recorded as the bytes that a BMA220 and a GPS would have
 sent. It goes through recorded buses into the real drivers and the real service. --lab finds what a car has that its
 model lacks; --field does so from recorded bytes, and shows what it does to the IRI. --car learns a car that nobody
-measured from four drives.
+measured from four drives. --years compares two years of a road.
 
   ridelog demo
   ridelog demo --lab
   ridelog demo --field
   ridelog demo --car
+  ridelog demo --years
 """
 
 from __future__ import annotations
 
 import argparse
 import json
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -39,7 +41,8 @@ if TYPE_CHECKING:
 
 
 REPORT_NAME, DUMP_NAME = "report.html", "drive.dump.gz"
-DRIVE_DIR, LAB_DIR, FIELD_DIR, CAR_DIR = "ridelog-demo", "ridelog-lab", "ridelog-field", "ridelog-car"
+DRIVE_DIR, LAB_DIR, FIELD_DIR, CAR_DIR, YEARS_DIR = (
+    "ridelog-demo", "ridelog-lab", "ridelog-field", "ridelog-car", "ridelog-years")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -50,15 +53,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
                            help=f"{words} (folder: {folder})")
     parser.add_argument("--out", metavar="DIR", type=Path, help=f"folder for what is written (default: {DRIVE_DIR})")
     parser.add_argument("--unpack", action="store_true",
-                        help="with --lab, --field or --car: only write the drives, so that you can find the answer "
-                             "yourself")
+                        help="with one of these: only write the drives, so that you can find the answer yourself")
     parser.add_argument("--json", action="store_true", help="print one JSON object for a program")
 
 
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog demo``."""
     if args.unpack and args.what is None:
-        raise BadInput("demo: expected --lab, --field or --car with --unpack")
+        raise BadInput("demo: expected --lab, --field, --car or --years with --unpack")
     if args.what is None:
         _drive(args.out or Path(DRIVE_DIR), args.json)
     else:
@@ -103,7 +105,6 @@ def car(out: Path, unpack_only: bool, as_json: bool) -> None:
     from logger.api.roads import random_road
     from logger.api.simulation import simulate
     from logger.api.vehicles import read_vehicle
-    from logger.commands.main import command
     from logger.vehicle.published_cars import NUMBERS, coordinates_of
 
     given = read_vehicle(CAR.vehicle)
@@ -118,21 +119,44 @@ def car(out: Path, unpack_only: bool, as_json: bool) -> None:
     learnt = out / "mycar.yaml"
     words = [*map(str, folders), "--wheelbase", f"{wheelbase_m:.2f}", "--out", str(learnt), "--out",
              str(learnt.with_suffix(".html"))]
-    typed = f"ridelog learn-car {' '.join(words)}"
+    _typed_for(_UNMEASURED, "learn-car", words, {"runs": list(map(str, folders)), "wheelbase_m": wheelbase_m}
+               if unpack_only else None, as_json)
     if unpack_only:
-        print(json.dumps({"runs": list(map(str, folders)), "wheelbase_m": wheelbase_m}) if as_json else
-              f"Four drives in {out}\nNext: {typed}")
         return
-    if not as_json:
-        print(f"{wrapped([_UNMEASURED])}\n\n    {typed}\n")
-    parser, run_it = command("learn-car")
-    run_it(parser.parse_args([*words, *(["--json"] if as_json else [])]))
     if not as_json:
         was, found = (np.exp(coordinates_of(one.vehicle)) for one in (true, read_vehicle(learnt)))
         rows = [(name, f"{was[at]:.3f}", f"{found[at]:.3f}") for at, name in enumerate(NUMBERS)
                 if name.endswith(("_hz", "damping_ratio"))]
         head = ["", "True values of the simulated car:", ""]
         print("\n".join([*head, *columns([("Parameter", "True", "Found"), *rows])]))
+
+
+_TWO_YEARS = (
+    "A box recorded six drives along one road, three in June 2025 and three in June 2026. In between, 200 m broke up "
+    "and 200 m were repaved. All of it is simulated. What changed, and where?"
+)
+
+
+def years(out: Path, unpack_only: bool, as_json: bool) -> None:
+    """Unpack the logs of two years into ``out``, and compare them as ``ridelog passes`` does."""
+    folders = sorted({str(path.parents[1]) for path in unpacked("years.zip", out)})
+    _typed_for(_TWO_YEARS, "passes", [*folders, "--split", "2026", "--out", str(out / "changes.html")],
+               {"logs": folders} if unpack_only else None, as_json)
+
+
+def _typed_for(introduction: str, verb: str, words: Sequence[str], only: Mapping[str, Any] | None, as_json: bool
+               ) -> None:
+    """Introduce a command and run it; ``only``: say what was unpacked and what to type, and run nothing."""
+    from logger.commands.main import command
+
+    typed = " ".join(["ridelog", verb, *words])
+    if only is not None:
+        print(json.dumps(only) if as_json else f"Next: {typed}")
+        return
+    if not as_json:
+        print(f"{wrapped([introduction])}\n\n    {typed}\n")
+    parser, run_it = command(verb)
+    run_it(parser.parse_args([*words, *(["--json"] if as_json else [])]))
 
 
 _INTRODUCTION = (
@@ -435,5 +459,6 @@ _SHOWN = {
     "lab": (lab, LAB_DIR, "show the lab: from two drives it finds what the model of a car lacks"),
     "field": (field, FIELD_DIR, "show the way from recordings in a car to a better IRI: four drives, two roads"),
     "car": (car, CAR_DIR, "learn the springs and dampers of an unmeasured car from four ordinary drives"),
+    "years": (years, YEARS_DIR, "show what changed on a road between two years: six drives"),
 }
 """What can be shown instead of a drive through the service, the folder for it, and its help."""

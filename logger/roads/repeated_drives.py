@@ -199,6 +199,7 @@ def means(passes: Passes, scatter: Scatter) -> Means:
 class Changes:
     """What changed in cells (k,), by growing key.
 
+    drives                     in either period, anywhere
     before, after              drives in either period
     change_m_per_km            mean after less mean before, with its standard error
     p_value                    of a change so large either way where there is none (normal distribution)
@@ -209,6 +210,7 @@ class Changes:
     """
 
     key: npt.NDArray[np.int64]
+    drives: tuple[int, ...]
     before: Ints
     after: Ints
     change_m_per_km: Array
@@ -232,7 +234,9 @@ def changes(passes: Passes, scatter: Scatter, split_s: float, length_m: float) -
     std = np.sqrt(variance)
     p_value = two_sided(change / std)
     mean = _mean_change(passes.of((early | late) & np.isin(passes.key, key)), scatter, split_s, length_m)
-    return Changes(key, one.drives[here], other.drives[there], change, std, p_value, false_discovery(p_value), *mean)
+    drives = tuple(len(np.unique(passes.drive[which])) for which in (early, late))
+    return Changes(key, drives, one.drives[here], other.drives[there], change, std, p_value, false_discovery(p_value),
+                   *mean)
 
 
 def _mean_change(passes: Passes, scatter: Scatter, split_s: float, length_m: float) -> tuple[float, float]:
