@@ -58,5 +58,5 @@ def _installed(package: str) -> Iterator[tuple[EntryPoint, Any]]:
             yield entry, entry.load()
         except Exception as error:
             raise CatalogueError(f"{entry.value} (entry point {entry.name!r} of {entry.group}): expected it to be "
-                                 f"imported, found {type(error).__name__}: {error}; mend or uninstall its package"
+                                 f"imported, found {type(error).__name__}: {error}; fix or uninstall its package"
                                  ) from error

@@ -171,7 +171,7 @@ class ByteReads:
             if others_from >= length and read[others_from:] == read[others_from - length:count - length]:
                 lap = count - count % length
                 return read[lap:] + read[count - length:lap]
-        raise OSError(errno.EAGAIN, "the registers were renewed while they were read, each time")
+        raise OSError(errno.EAGAIN, "the registers changed during each attempt to read them")
 
 
 def open_serial(path: str, baud: int) -> BytePort:

@@ -271,7 +271,7 @@ def _form_of_numbers(lines: list[bytes]) -> str:
     text = texts[-1]
     if all(map(_PLAIN.fullmatch, texts[-3:])):
         largest = max(abs(value) for row in same for value in row)
-        return f"three numbers up to {largest:g}, which no sample can be by this profile's unit and range"
+        return f"three numbers up to {largest:g}, too large for a sample in this profile's unit and range"
     more = f"{count} numbers"
     if count > 3 and len(same) > 2 and all(a[0] < b[0] for a, b in pairwise(same)):
         more += ", the first of which grows as a time does,"

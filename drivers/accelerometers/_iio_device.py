@@ -131,7 +131,7 @@ def understood(description: Mapping[str, Any]) -> ScanLayout:
         timestamp = elements.get(TIMESTAMP) if description["clock"] == MONOTONIC else None
         name = str(description["name"])
     except (KeyError, TypeError, ValueError, AttributeError) as error:
-        raise BadReply(f"an IIO description: expected what the kernel says of its device, found "
+        raise BadReply(f"an IIO description: expected the kernel's description of its device, found "
                        f"{shortened(str(error))}") from None
     if not polled and len(axes) != len(AXES):
         raise BadReply("an IIO description: expected scans with in_accel_x, in_accel_y and in_accel_z")
@@ -157,7 +157,7 @@ def _elements(channels: Any) -> tuple[dict[str, Element], int]:
         raise ValueError("too many channels")
     ordered = sorted((int(index), str(name), str(kind)) for name, index, kind in channels)
     if any(before[0] == after[0] for before, after in pairwise(ordered)):
-        raise ValueError("two channels at one place")
+        raise ValueError("two channels with one index")
     for _, name, kind in ordered:
         match = _TYPE.fullmatch(kind)
         if match is None:
@@ -282,7 +282,7 @@ class IioDevice:
             write(enable, "1")
         except OSError as error:
             if error.errno in _NOT_ALLOWED:
-                return "" if runs else "the service may not switch its buffer on"
+                return "" if runs else "the service is not allowed to switch its buffer on"
             return f"its buffer cannot be switched on ({error.strerror})"
         self._is_ours = True
         return ""

@@ -352,8 +352,8 @@ def _ordered(table: LoggerTable, times_s: Array, roles: tuple[str, ...], notes: 
     back_s = np.maximum.accumulate(time_s) - time_s if len(time_s) else time_s
     if (back_s > _DISORDER_S).any():
         row = int(np.argmax(back_s > _DISORDER_S))
-        raise table.wrong(int(rows[row]), f"expected times that grow, found one {back_s[row]:.3g} s before an earlier "
-                          "one: the clock was set back; cut the file there")
+        raise table.wrong(int(rows[row]), f"expected increasing times, found one {back_s[row]:.3g} s earlier than one "
+                          "before: the clock was set back; cut the file there")
     if back_s.any():
         notes.append(f"{table.header.path.name}: {np.count_nonzero(back_s)} rows were out of order; sorted by time")
         order = np.argsort(time_s, kind="stable")
@@ -361,13 +361,13 @@ def _ordered(table: LoggerTable, times_s: Array, roles: tuple[str, ...], notes: 
     twice = np.append(False, (np.diff(time_s) == 0) & (np.diff(values, axis=0) == 0).all(axis=1)) if len(
         time_s) else np.zeros(0, dtype=np.bool_)
     if twice.any():
-        notes.append(f"{table.header.path.name}: {np.count_nonzero(twice)} rows were there twice; dropped")
+        notes.append(f"{table.header.path.name}: {np.count_nonzero(twice)} duplicate rows were dropped")
     return time_s[~twice], values[~twice]
 
 
 def _left_out(even: EvenSamples, count: int, still_s: float) -> tuple[LeftOut, ...]:
     """Of so many samples, and of as many seconds at the beginning in which nothing moved."""
-    still = LeftOut(sum(even.holds_s) + still_s, "s", "in which the sensor stood still on all axes")
+    still = LeftOut(sum(even.holds_s) + still_s, "s", "in which the sensor was frozen on all axes")
     if even.holds_s:
         return (still,)
     return still, LeftOut(even.repeats * count, "sample", "that only repeated the one before")
@@ -380,7 +380,7 @@ def _repairs(even: EvenSamples) -> list[str]:
                      f"the sensor gave {even.own_hz:.4g} Hz")
     if even.holds_s and even.repeats > 0:
         places = counted(len(even.holds_s), "place")
-        notes[-1:] = [f"the sensor stood still on all axes for {sum(even.holds_s):.3g} s in {places}, the longest "
+        notes[-1:] = [f"the sensor was frozen on all axes for {sum(even.holds_s):.3g} s in {places}, the longest "
                       f"{max(even.holds_s):.3g} s; those samples are left out"]
     if not even.as_read:
         notes.append(f"{even.own_hz:.4g} samples a second, laid on an even grid of {RATE_HZ:g} Hz")
@@ -401,7 +401,7 @@ def _without_standstill(even: EvenSamples, fixes: Fixes, notes: list[str]) -> tu
     still &= np.interp(even.time_s, fixes.time_s, fixes.speed_mps) >= MOVING_MPS if len(fixes.time_s) else False
     if (lasts_s := np.count_nonzero(still) / RATE_HZ) <= LONGEST_HOLE_S:
         return even, 0.0
-    notes.append(f"the sensor stood still on all axes for the first {lasts_s:.3g} s, while the car drove; left out")
+    notes.append(f"the sensor was frozen on all axes for the first {lasts_s:.3g} s, while the car drove; left out")
     return replace(even, present=even.present & ~still), lasts_s
 
 

@@ -486,7 +486,7 @@ def _range_words(found: Assessment) -> str:
         return f"none over {RESOLVED_SHARE:.0%} of the drive."
     left_out = f"; {road.left_out_m:.0f} m in short stretches are left out" if road.left_out_m else ""
     return (f"{road.shortest_m:.2g} to {road.longest_m:.3g} m (each end over {RESOLVED_SHARE:.0%} of the drive); "
-            f"a profile holds these{left_out}.")
+            f"a profile contains only these{left_out}.")
 
 
 def _table(summary: dict[str, Any]) -> Iterator[Block]:

@@ -71,8 +71,8 @@ def ingested(question: IngestQuestion) -> Ingested:
     with dataset.writing():
         key = own_key(dataset.folder)
         if trim_m is not None and not dataset.is_new and trim_m != dataset.manifest.trim_m:
-            raise question.wrong("trim_m", f" {trim_m:g}: expected {dataset.manifest.trim_m:g} m, as the dataset was "
-                                           "begun with")
+            raise question.wrong("trim_m", f" {trim_m:g}: expected {dataset.manifest.trim_m:g} m, as at the dataset's "
+                                           "first ingest")
         keep_names(dataset.folder, {name for _, name in named}, key)
         with _keys(dataset, None if roads is None else Path(roads)) as (keyed, roads_sha256):
             counts = ingest_sessions(
@@ -137,7 +137,7 @@ def _summarised(question: SummariseQuestion | ReportQuestion, by: str
     since_us, until_us = day_us(question.since), day_us(question.until)
     dataset = existing(folder)
     if by == "route" and not dataset.manifest.roads:
-        raise question.wrong("by", " route: expected a dataset that was begun with `roads`")
+        raise question.wrong("by", " route: expected a dataset made with `roads`")
     empty = BadInput(f"{folder}: expected at least one pass with an IRI in that time")
     files = dataset.files(since_us, None if until_us is None else until_us - 1)
     if not files:
@@ -169,7 +169,7 @@ def _keys(dataset: Dataset, roads: Path | None) -> Iterator[tuple[Keyed, str]]:
     content = read_bounded(roads or dataset.folder / _ROADS, MAX_BYTES)
     digest = sha256(content).hexdigest()
     if not dataset.is_new and digest != dataset.manifest.roads:
-        raise BadInput(f"{roads or dataset.folder / _ROADS}: expected the roads that the dataset was begun with")
+        raise BadInput(f"{roads or dataset.folder / _ROADS}: expected the roads of the first ingest")
     try:
         pieces = pieces_of(read_road_lines(roads or dataset.folder / _ROADS))
     except ValueError as error:
@@ -193,7 +193,7 @@ def _car_of(log: Path) -> str:
     if not isinstance(name, str) or not name:
         raise BadInput(f"{log}: expected the car's name in the description beside it, or --car NAME")
     if name == GENERIC:
-        raise BadInput(f"{log}: expected the car's name, found {GENERIC}, which any car may be: --car NAME")
+        raise BadInput(f"{log}: expected the car's name, found {GENERIC}, no car in particular: --car NAME")
     return name
 
 

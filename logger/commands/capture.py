@@ -69,7 +69,7 @@ def captured(asked: CaptureQuestion) -> Checked:
     print("\r", end="", file=sys.stderr, flush=True)
     advice = "" if total else port_advice(asked.port)
     if fault is not None:
-        print(f"ridelog: {fault}; what came before is kept", file=sys.stderr)
+        print(f"ridelog: {fault}; everything before it is kept", file=sys.stderr)
     lines = [f"{total} bytes in {duration_s:.1f} s, {total / max(duration_s, 1e-6):.0f} bytes/s, in {asked.out}",
              *first_look(look), *([f"{advice}."] if advice else [])]
     return Checked("\n".join(lines), {}, bool(total) and fault is None)
@@ -78,7 +78,7 @@ def captured(asked: CaptureQuestion) -> Checked:
 def first_look(data: bytes) -> list[str]:
     """What a stream of bytes looks like, as lines for a person: text or frames, and how long they may be."""
     if not data:
-        return ["Nothing came. Check that the device is on and sends, the baud rate, and TX against RX."]
+        return ["Nothing arrived. Check that the device is on and sends, the baud rate, and TX against RX."]
     lines = ["First bytes:", *_hex_rows(data[:_SHOWN_BYTES])]
     text = sum(byte in b"\t\r\n" or 32 <= byte < 127 for byte in data) / len(data)
     if text > 0.95 and b"\n" in data:
@@ -92,7 +92,7 @@ def first_look(data: bytes) -> list[str]:
     distances = repeat_distances(data)
     if distances:
         shown = ", ".join(f"{distance} ({share:.0%})" for distance, share in distances)
-        lines.append(f"Bytes repeat most often after: {shown} bytes. The first is probably the frame length.")
+        lines.append(f"Bytes repeat most often every: {shown} bytes. The first is probably the frame length.")
     return lines
 
 

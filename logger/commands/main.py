@@ -291,4 +291,4 @@ def _without_verb(arguments: list[str]) -> int:
         return 0
     word = options.command
     found = "" if word is None else f", found {word!r}{did_you_mean(word, VERBS)}"
-    return parser.error(f"expected a command out of {', '.join(VERBS)}{found}")
+    return parser.error(f"expected a command{found}")

@@ -154,6 +154,8 @@ def _number(kind: Any, option: Option) -> Callable[[str], float] | None:
                 return float(found[1]) * LENGTH_UNITS_M[found[2]]
             return float(text) if kind is float else int(text)
         except ValueError:
+            if in_metres:
+                raise ValueError("expected a length in m, or with m, km, mi or ft after it") from None
             without = ", without its unit" if text[:1].isdigit() and text[-1:].isalpha() else ""
             what = ("a number" if kind is float else "a whole number") + f" in {unit}" * bool(unit)
             raise ValueError(f"expected {what}{without}") from None

@@ -45,11 +45,11 @@ class ReportQuestion(Question):
     """
 
     logs: Annotated[list[Path], Argument(
-        "log files, folders of them, exported sticks; a log that is there twice counts once", metavar="LOGS", read=Path,
+        "log files, folders of them, exported sticks; duplicate logs count once", metavar="LOGS", read=Path,
         many=list)]
     out: Annotated[Path, Option("page to write", metavar="FILE.html", read=Path, check=_web_page)]
     base: Annotated[Path | None, Option(
-        "roads to draw beneath the drives, such as an extract of OpenStreetMap, kept in the page",
+        "roads as background, such as an extract of OpenStreetMap, kept in the page",
         metavar="ROADS.geojson", read=Path)] = None
     tiles: Annotated[str, Option(
         "draw pictures of streets beneath the drives: the page then asks a server for them (with {z}, {x} and {y} in "

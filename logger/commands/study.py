@@ -127,7 +127,7 @@ def _all(known: list["Study"], asked: StudyQuestion) -> Answer:
     said = {"page": str(asked.out / "index.html"), "studies": [
         {**_in_short(one), "seconds": round(carried[one.called].seconds, 2),
          "failure": carried[one.called].failure or None} for one in chosen]}
-    return Checked(f"{len(chosen)} studies, {len(failed)} contradict their stated words. "
+    return Checked(f"{len(chosen)} studies, {len(failed)} contradict their stated verdicts. "
                    f"Page: {asked.out / 'index.html'}", said, not failed)
 
 

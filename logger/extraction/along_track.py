@@ -49,7 +49,7 @@ class MeasuredLine:
         if len(distance_m) < 2:
             raise ValueError("expected two places or more")
         if not (np.diff(distance_m) > 0).all():
-            raise ValueError("expected distances that grow from place to place")
+            raise ValueError("expected distances that increase from place to place")
         east_m, north_m = _flat(lat_deg, lon_deg, float(lat_deg[0]), float(lon_deg[0]))
         apart_m, ahead_m = np.hypot(np.diff(east_m), np.diff(north_m)), np.diff(distance_m)
         if (far := apart_m > (1 + _MORE) * ahead_m + _PLACE_M).any():

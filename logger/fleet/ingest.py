@@ -382,7 +382,7 @@ def ingest_sessions(dataset: Dataset, sessions: Sequence[Session], keyed: Keyed,
     """Add what is new; the dataset is being written to by this process. Raises BadInput and OSError, and then what was
     committed stays.
 
-    A log whose bytes are known is passed over. Of a session that is known in part, rows are compared by number and
+    A log whose bytes are known is skipped. Of a session that is known in part, rows are compared by number and
     check value; a row of the same number and time with another check value is a contradiction, counted, and the first
     one stays. So an ingest that was cut off goes on where it was when it is started again.
     """

@@ -103,7 +103,7 @@ def figures_words(figures: FleetFigures) -> str:
         lines.append(f"The standard error of one pass over 66 ft of road is {biases.pass_std:.1%}, of which "
                      f"{biases.session_std:.1%} is shared by all passes of a session")
     if isfinite(biases.growth_per_year):
-        lines.append(f"The mean road changes by {biases.growth_per_year:+.1%} a year")
+        lines.append(f"The average road changes by {biases.growth_per_year:+.1%} a year")
     return "\n".join([*lines, "", *_words_cars(figures), "", *_roads(roads), "", *_changes(roads)])
 
 
@@ -131,7 +131,7 @@ def _words_cars(figures: FleetFigures) -> list[str]:
     order = np.argsort(-np.abs(bias) * biases.known, kind="stable")
     sure = [one for one in order.tolist() if biases.known[one] and abs(bias[one]) > sure_stds * std[one]]
     alone = int((~biases.known).sum())
-    lines = [f"Cars that differ from the mean car ({len(sure)} of {len(bias)})"]
+    lines = [f"Cars that differ from the average car ({len(sure)} of {len(bias)})"]
     width = max((len(figures.names[one]) for one in sure[:shown_cars]), default=0)
     lines += [f"  {figures.names[one]:{width}}  {bias[one]:+7.1%} ± {std[one]:.1%}  "
               f"{int(figures.car_passes[one]):,} passes" for one in sure[:shown_cars]]
@@ -352,7 +352,7 @@ def _tiles(figures: FleetFigures, sections: RoadTable) -> doc.Html:
     return tiles([
         ("Road, each direction", distance_words(float(segments.length_m.sum())), ""),
         ("Mean roughness (IRI)", f"{mean:.2f}", "m/km"),
-        ("Change of the mean road", f"{growth:+.1%}" if np.isfinite(growth) else None, "a year"),
+        ("Change of the average road", f"{growth:+.1%}" if np.isfinite(growth) else None, "a year"),
         ("Became worse", f"{int(sections.worse.sum()):,}" if sections.changes_known else None,
          f"of {len(sections.key):,} sections"),
         ("To visit", f"{int((sections.visit != '').sum()):,}", "sections"),
@@ -417,8 +417,8 @@ def _cars(figures: FleetFigures) -> doc.Html:
              f"{biases.gain[one] * biases.log_std[one]:.1%}" if biases.known[one] else "not known",
              f"{figures.car_passes[one]:,.0f}") for one in order]
     return doc.section("Cars", doc.grid(("Car", "Reads", "Passes"), rows) + doc.hint(not_known(figures) or (
-        "Bias of a car on the roads that it shares with others, relative to the mean car; the figures above are "
-        "corrected for it. Cars that differ from the mean car come first.")))
+        "Bias of a car on the roads that it shares with others, relative to the average car; the figures above are "
+        "corrected for it. Cars that differ from the average car come first.")))
 
 
 INDEX = "index.html"

@@ -76,7 +76,7 @@ class DriveModel:
                 read(vehicle, name)
             part, _, leaf = name.rpartition(".")
             if wanted.count(name) > 1 or (part in AXLES and f"{BOTH}.{leaf}" in wanted):
-                raise ValueError(f"expected every number once, found {name} twice")
+                raise ValueError(f"expected every parameter once, found {name} twice")
         self.measured = [record.kept_mps2 for record in records]
         car = compose(vehicle, self.effects)
         self.exact = not (car.bends_laws or car.structure.held)

@@ -222,7 +222,7 @@ class _FitProblem:
     def __post_init__(self) -> None:
         self.free = list(self.model.parameters)
         if not self.free:
-            raise ValueError("expected at least one free number")
+            raise ValueError("expected at least one free parameter")
         self.low_pass = DecimatingLowPass(self.options.rate_hz, self.options.low_pass_hz)
         self.coordinates = Coordinates(self.free)
         self.low, self.high = self.coordinates.low, self.coordinates.high

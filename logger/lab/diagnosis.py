@@ -267,7 +267,7 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
     nominal = posterior.start(present)
     fine, state = after.posterior, after.state
     noise = sensor_noise_with_rounding(fine, state)
-    progress("how certain the numbers are")
+    progress("standard errors of the parameters")
     errors = standard_errors(after)
     progress("what these runs could not show")
     excess_of = excess_by_signal(fine, state, FALSE_ALARM)

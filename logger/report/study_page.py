@@ -48,7 +48,7 @@ def _items(study: Study, result: Result) -> doc.Html:
         checks = max(len(study.checks_of(name, result)) for name in names)
         counted = f" ({checks} check{'s' * (checks > 1)}{' of each' * (len(names) > 1)})" if checks else ""
         lines.append(f"{_joined(names)}: {word_of(study.checks_of(item.name, result))}. {item.because}{counted}")
-    return doc.section("How ours stands beside the print", doc.bullets(lines))
+    return doc.section("Ours against the print", doc.bullets(lines))
 
 
 def _picture(picture: Picture) -> doc.Html:
@@ -74,8 +74,8 @@ def index(known: Sequence[Study], carried: Mapping[str, Carried], share: float =
     parts = [[one for one in known if (one.source == DISSERTATION) is its_own] for its_own in (True, False)]
     titles = (f"Contents: {DISSERTATION}", "Contents: other sources")
     return doc.document("Studies", [
-        doc.heading("Studies: printed results, made again",
-                    "Each printed item has one word for how ours compares with it."),
+        doc.heading("Studies: printed results, recomputed",
+                    "Each printed item has a verdict on how ours compares with it."),
         doc.paragraphs(_quick(share)), doc.tiles(tile for tile in counts if tile[1] != "0"),
         *(_contents(title, part, carried) for title, part in zip(titles, parts, strict=True) if part)],
         style=_INDEX_STYLE)

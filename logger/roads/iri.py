@@ -428,7 +428,7 @@ def likely_unit(by_speed_m: float, by_distance_m: float) -> str:
 def limit_hint(limit_m_per_km: float) -> str:
     """What an IRI from which on a road is to be called rough may mean where no road has it; else nothing."""
     return "" if not HIGHEST_LIMIT_M_PER_KM < limit_m_per_km < np.inf else (
-        f", which roads seldom reach; {limit_m_per_km:g} in/mi are {limit_m_per_km * INCH_PER_MILE_M_PER_KM:.4g} m/km")
+        f", which few roads reach; {limit_m_per_km:g} in/mi are {limit_m_per_km * INCH_PER_MILE_M_PER_KM:.4g} m/km")
 
 
 def _likely(iri_m_per_km: float) -> list[str]:

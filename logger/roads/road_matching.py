@@ -203,7 +203,7 @@ class RoadNetwork:
         measure_m = length_m if measure_m is None else measure_m
         corners, length_m, measure_m = corners[kept], length_m[kept], measure_m[kept]
         if not (np.diff(measure_m) > 0).all():
-            raise ValueError("expected measures that grow along the line")
+            raise ValueError("expected measures that increase along the line")
         at_m = np.unique(np.concatenate([np.arange(0.0, length_m[-1], _STEP_M), length_m]))
         points = np.column_stack([np.interp(at_m, length_m, corners[:, axis]) for axis in range(3)])
         middle_m = (at_m[1:] + at_m[:-1]) / 2
@@ -651,7 +651,7 @@ def measures(lat_deg: Array, lon_deg: Array, begin_m: float | None, end_m: float
     order = np.argsort(at_m)
     at_m, known_m = at_m[order], post_m[order]
     if (np.diff(at_m) < shortest_m).any() or (np.diff(known_m) <= 0).any():
-        raise ValueError("expected kilometre posts that follow each other along the line by growing numbers")
+        raise ValueError("expected kilometre posts that follow each other along the line by increasing numbers")
     measured = np.interp(length_m, at_m, known_m)
     return measured + np.minimum(length_m - at_m[0], 0.0) + np.maximum(length_m - at_m[-1], 0.0)
 

@@ -24,7 +24,7 @@ from logger.units import US_PER_S
 STEP_US = 500_000
 IDLE_US = 120_000_000
 STEP_BYTES = 1_000_000
-"""More than any instrument sends in a step; the rest of what claims to be of one moment is passed over."""
+"""More than any instrument sends in a step; the rest of what claims to be of one moment is skipped."""
 
 log = logging.getLogger(__name__)
 
@@ -98,7 +98,7 @@ class EventCore:
             self.accelerometer.feed(t_us, data)
         except BadReply as error:
             self.bad_events += 1
-            log.warning("event at %.6f s passed over: %s", t_us / 1e6, error)
+            log.warning("event at %.6f s skipped: %s", t_us / 1e6, error)
 
     def advance(self, now_us: int) -> None:
         """Make the steps that lie at or before ``now_us``; every event before that has been fed.

@@ -359,7 +359,7 @@ class Odometer:
 
     def _plausible(self, t_us: int, speed_mps: float, lat_deg: float, lon_deg: float) -> bool:
         """False for a fix that no car can reach from the last one: a damaged line passes an 8-bit check about once in
-        256. A lone one is passed over; after some in a row it is the old knot that is no longer believed."""
+        256. A lone one is skipped; after some in a row it is the old knot that is no longer believed."""
         if not self._t_us:
             return True
         gap_s = (t_us - self._t_us[-1]) / US_PER_S

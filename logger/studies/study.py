@@ -29,7 +29,7 @@ from logger.errors import BadInput
 
 
 class Word(StrEnum):
-    """How ours stands beside the print; the first that any check of an item has is the item's."""
+    """Ours against the print; the first that any check of an item has is the item's."""
 
     MISPRINT = "misprint"
     NOT_REPRODUCIBLE = "not reproducible"

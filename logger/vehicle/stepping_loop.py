@@ -59,7 +59,7 @@ def functions_of(law: MotionLaw) -> list[Any]:
     for word, one in zip(("force", "rates"), functions, strict=False):
         if not isinstance(one, FunctionType) or one.__closure__ or one.__defaults__ or one.__code__.co_argcount != 2:
             raise ValueError(f"expected {word} to be a function of (p, seen) at the top of the file, or a "
-                             "@staticmethod, that knows its numbers by p alone")
+                             "@staticmethod, that gets its parameters by p alone")
     return functions
 
 

@@ -162,7 +162,7 @@ def test_a_sensor_that_stood_still_for_a_while_left_a_hole(comfort) -> None:
     still[1000:2000] = still[1000]
     status, _, complaints = comfort(EVEN_S, still)
     assert (status, len(complaints)) == (2, 1)
-    assert "ride.csv:1003: expected no hole above 0.5 s, found a sensor that stands still" in complaints[0]
+    assert "ride.csv:1003: expected no hole above 0.5 s, found a sensor frozen" in complaints[0]
     short = samples.copy()
     short[1000:1030] = short[1000]
     status, reported, _ = comfort(EVEN_S, short)
@@ -247,7 +247,7 @@ def test_modes_refuses_sensors_that_stood_still_for_a_while(tmp_path: Path) -> N
     path = write_record(tmp_path / "tower.csv", EVEN_S, top=top, middle=middle)
     done = called("modes", path, "--method", "ssi")
     assert done.returncode == 2
-    assert "tower.csv:1003: expected no hole above 0.5 s, found a sensor that stands still on all axes" in done.stderr
+    assert "tower.csv:1003: expected no hole above 0.5 s, found a sensor frozen on all axes" in done.stderr
 
 
 def test_a_record_that_begins_with_a_sensor_at_rest_is_doubted(tmp_path: Path) -> None:
@@ -260,4 +260,4 @@ def test_a_record_that_begins_with_a_sensor_at_rest_is_doubted(tmp_path: Path) -
     assert done.returncode == 0, done.stderr
     held = [one["seconds"] for one in json.loads(done.stdout)["doubts"] if one["what"] == "held"]
     assert held == [pytest.approx(10, abs=0.02)]
-    assert "stands still on all axes for the first" in done.stderr
+    assert "is frozen on all axes for the first" in done.stderr

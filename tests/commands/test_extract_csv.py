@@ -281,7 +281,7 @@ def test_a_sensor_that_stood_still_ends_a_run(still: tuple[int, int], runs: int,
     stood_s = (still[1] - still[0]) / 100
     assert sum(one["seconds"] for one in found["runs"]) == pytest.approx(40 - stood_s, abs=1.5)
     (lost,) = found["left_out"]
-    assert lost["why"] == "in which the sensor stood still on all axes"
+    assert lost["why"] == "in which the sensor was frozen on all axes"
     assert lost["amount"] == pytest.approx(stood_s, abs=0.1)
 
 
@@ -292,7 +292,7 @@ def test_an_axis_that_stands_still_alone_is_named(tmp_path: Path) -> None:
     log = table(tmp_path / "log.csv", "t,ax,ay,az,v", *values.T, form="%.3f")
     found = json.loads(called("extract", "--csv", log, "--columns", NAMES, "--speed", "10", "--out", tmp_path / "o",
                               "--json").stdout)
-    assert [note for note in found["notes"] if note.startswith("z alone stands still for ")]
+    assert [note for note in found["notes"] if note.startswith("z alone is frozen for ")]
 
 
 @pytest.mark.parametrize("rate_hz", [10, 50, 100])

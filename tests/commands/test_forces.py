@@ -358,7 +358,7 @@ def test_uneven_clocks_are_laid_on_even_times_and_nothing_is_compared_beyond_the
     assert main(["compare", "--vehicle", str(tmp_path / "part.yaml"), str(tmp_path / "run"), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found["error"] < 0.01
-    not_driven = [one["amount"] for one in found["left_out"] if "nothing drove it" in one["why"]]
+    not_driven = [one["amount"] for one in found["left_out"] if "without excitation" in one["why"]]
     assert not_driven == ([pytest.approx(12.0 - excitation_ends_s, abs=0.02)] if excitation_ends_s < 12 else [])
 
 
@@ -399,7 +399,7 @@ def test_a_record_that_is_mostly_clipped_or_mostly_not_there_is_refused(tmp_path
     size = np.median(np.abs(seen["accel_z_mps2"])) / 2
     run = written(tmp_path / "run", {"accel_z_mps2": np.clip(seen["accel_z_mps2"], -size, size)},
                   {"force_n": push(TIME_S)}, BODY)
-    with pytest.raises(BadInput, match=r"found 7\d% of them at the largest and the smallest one exactly"):
+    with pytest.raises(BadInput, match=r"found 7\d% of them exactly at the largest or smallest value"):
         ridelog.compare(tmp_path / "bench.yaml", [run])
     lines = (run / "drive.csv").read_text().splitlines()
     (run / "drive.csv").write_text("\n".join(lines[:100] + lines[-100:]) + "\n")
@@ -797,7 +797,7 @@ def test_a_part_whose_force_is_in_kilonewtons_is_refused_if_its_damper_is_known(
 
 @pytest.mark.parametrize(("spoilt", "words"), [
     (lambda force_n: -force_n, "found the opposite sign"),
-    (lambda force_n: np.clip(force_n, -0.6, 0.4), "of them at the largest and the smallest one exactly"),
+    (lambda force_n: np.clip(force_n, -0.6, 0.4), "of them exactly at the largest or smallest value"),
     (lambda force_n: np.where(abs(TIME_S - 5.0) < 0.5, 0.3, force_n), "found 0.3 from 4.504 to"),
 ], ids=["sign", "clipped", "stuck"])
 def test_a_force_that_was_not_measured_rightly_is_refused_in_one_line(

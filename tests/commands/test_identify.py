@@ -294,7 +294,7 @@ def test_roads_that_were_not_measured(tmp_path: Path, capsys: pytest.CaptureFixt
     (f"each.{MASS}", (), "expected a parameter of the road after each."),
     ("mass", (), "no parameter 'mass'; expected one of sprung_mass_kg"),
     ("", (), "expected names with commas"),
-    ("front.tire_stiffness_n_per_m,both.tire_stiffness_n_per_m", (), "expected every number once"),
+    ("front.tire_stiffness_n_per_m,both.tire_stiffness_n_per_m", (), "expected every parameter once"),
     (MASS, ("--start", "sprung_mass_kg"), "expected PARAM=NUMBER"),
     (MASS, ("--start", f"{DAMPERS}=3"), "expected one of what is free"),
     (MASS, ("--bounds", f"{MASS}=900,1000"), "expected a start between its bounds"),

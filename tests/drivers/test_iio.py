@@ -140,7 +140,7 @@ def test_what_may_not_be_written_is_used_as_it_stands(tmp_path: Path, monkeypatc
     refused(monkeypatch, errno.EROFS)
     fake = fake_in(tmp_path / "off")
     _, source = looked(fake, 0.1)
-    assert "the service may not switch its buffer on" in source.note
+    assert "the service is not allowed to switch its buffer on" in source.note
     on = {"buffer/enable": "1", "trigger/current_trigger": "other", "sampling_frequency": "200",
           **{f"scan_elements/in_accel_{axis}_en": "1" for axis in "xyz"}}
     fake = fake_in(tmp_path / "on", **on)

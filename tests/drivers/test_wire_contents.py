@@ -205,7 +205,7 @@ def test_at_the_receivers_port_it_says_what_comes_and_what_to_do() -> None:
     ("{x:.3f};{y:.3f};{z:.3f}\r\n", "3 numbers with semicolons between them"),
     ("{x:.3f},{y:.3f},{z:.3f},\r\n", "3 numbers with a separator after the last one"),
     ("{x:.3f} {y:.3f} {z:.3f}\r\n", "3 numbers with blanks between them"),
-    ("16{x:+.0f}384,-16384,{z:.0f}6384\r\n", "which no sample can be"),
+    ("16{x:+.0f}384,-16384,{z:.0f}6384\r\n", "too large for a sample"),
 ], ids=["words", "semicolons", "last comma", "blanks", "counts"])
 def test_at_the_sensors_port_it_says_how_lines_differ(form: str, words: str) -> None:
     decoder = PascoDecoder(load_profile("lines"))

@@ -65,7 +65,7 @@ def test_of_a_drive_the_lab_counts_standing_beginnings_and_holes() -> None:
                       np.cumsum(speed) / 100, None, None, usable=usable, track=Track(1.0, np.zeros(500)))
     found = {one.why: one.amount for one in runs_left_out(driven_stretches(one))}
     assert found == {
-        "in which nothing drove it or nothing was read": pytest.approx(10.0, abs=0.1),
+        "without excitation or readings": pytest.approx(10.0, abs=0.1),
         "without a reading": 100,
         "at the beginning of runs, as the motion before is unknown": pytest.approx(4.0, abs=0.1)}
     without = replace(one, usable=None, speed_mps=np.full(count, 10.0))

@@ -88,7 +88,7 @@ def test_starts_and_ends_of_drives_are_cut(logs: Path, tmp_path: Path) -> None:
     whole, cut = 26 * 7.62, 50
     kept = [at for at in range(26) if at * 7.62 >= cut and whole - (at + 1) * 7.62 >= cut]
     assert sorted({row[2] for row in rows_of(tmp_path / "town")}) == [at + 1 for at in kept]
-    with pytest.raises(BadInput, match=r"--trim-m 20: expected 50 m, as the dataset was begun with"):
+    with pytest.raises(BadInput, match=r"--trim-m 20: expected 50 m, as at the dataset's first ingest"):
         main(["fleet", "ingest", str(logs), "--to", str(tmp_path / "town"), "--car", "x", "--trim-m", "20"])
 
 
@@ -188,7 +188,7 @@ def test_means_biases_and_changes_are_found_within_their_errors(tmp_path: Path, 
 @pytest.mark.parametrize(("arguments", "complaint"), [
     (["summarise", "nothing"], r"nothing: expected a dataset that 'ridelog fleet ingest' has made"),
     (["ingest", "LOGS", "--to", "TOWN"], r"expected the car's name in the description beside it, or --car NAME"),
-    (["summarise", "TOWN", "--by", "route"], r"--by route: expected a dataset that was begun with --roads"),
+    (["summarise", "TOWN", "--by", "route"], r"--by route: expected a dataset made with --roads"),
     (["summarise", "TOWN", "--engine", "oracle"], r"--engine oracle: expected duckdb, spark://HOST:PORT"),
     (["summarise", "TOWN", "--since", "spring"], r"--since spring: expected a date such as 2026-04-30"),
     (["summarise", "TOWN", "--since", "2030-01-01"], r"expected at least one pass with an IRI in that time"),

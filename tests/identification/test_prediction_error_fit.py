@@ -157,7 +157,7 @@ def test_what_is_not_asked_right() -> None:
     model = DriveModel(CAR, [free(CAR, MASS)], [BUMP])
     with pytest.raises(ValueError, match="as long as the predictions"):
         fit(model, [model.measured[0][1:]])
-    with pytest.raises(ValueError, match="at least one free number"):
+    with pytest.raises(ValueError, match="at least one free parameter"):
         fit(DriveModel(CAR, [], [BUMP]), model.measured)
 
 

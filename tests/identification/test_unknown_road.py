@@ -224,7 +224,7 @@ def test_what_no_such_drive_can_tell() -> None:
 def test_what_is_not_asked_right() -> None:
     with pytest.raises(ValueError, match="cannot be found where the road is not known"):
         response(HALF, "contact_patch_m")
-    with pytest.raises(ValueError, match="at least one free number"):
+    with pytest.raises(ValueError, match="at least one free parameter"):
         fit_roads(response(HALF), [[driven(HALF, track(60.0, 1), 14.0, 40.0, 1)]])
     with pytest.raises(ValueError, match="a drive over every road"):
         fit_roads(response(HALF, MASS), [[]])

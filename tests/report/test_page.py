@@ -248,12 +248,12 @@ def test_many_places_are_one_report_and_a_copy_counts_once(drive, tmp_path: Path
 
 
 @pytest.mark.parametrize(("text", "words"), [
-    ("{", "expected GeoJSON, found what is no JSON"), ("[]", "expected GeoJSON, an object with a type"),
+    ("{", "expected GeoJSON, found text that is not JSON"), ("[]", "expected GeoJSON, an object with a type"),
     ('{"type": "FeatureCollection", "features": []}', "expected roads as LineString or MultiLineString, found none"),
     ('{"type": "LineString", "coordinates": [[6.5]]}', r"expected lines of at least two \[longitude, latitude\]"),
     ('{"type": "LineString", "coordinates": [[6.5, 46], [6.5, "x"]]}', "in degrees, found"),
     ('{"type": "LineString", "coordinates": [[6.5, 46], [6.5, 460]]}', "in degrees, found"),
-    ('{"type": "MultiLineString", "coordinates": [5]}', "in degrees, found 5"), ("[" * 100_000, "no JSON")])
+    ('{"type": "MultiLineString", "coordinates": [5]}', "in degrees, found 5"), ("[" * 100_000, "not JSON")])
 def test_roads_that_are_none_are_refused(drive, tmp_path: Path, text: str, words: str) -> None:
     write_log(tmp_path / "00001-001.csv", drive(2))
     (tmp_path / "roads.geojson").write_text(text)

@@ -298,7 +298,7 @@ def test_a_second_service_on_the_same_folder_is_refused(
         [ridelog, "run", "--config", tmp_path / "ridelog.yaml"], capture_output=True, text=True, timeout=PATIENCE_S
     )
     assert second.returncode == 2
-    assert "another ridelog writes here" in second.stderr
+    assert "another ridelog is writing here" in second.stderr
     again = [ridelog, "replay", short_dump, "--out", service.log]
     assert subprocess.run(again, capture_output=True, timeout=PATIENCE_S).returncode == 2
     assert service.terminate() == 0

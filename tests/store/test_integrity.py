@@ -84,7 +84,7 @@ def test_damaged_row_is_one_corrupt_record_and_no_gap(tmp_path: Path) -> None:
     lines[2] = lines[2].replace("15.000", "15.001")
     check = found(store(tmp_path / "a.csv", lines))
     assert counts(check) == (2, 0, 1, 0)
-    assert check.problems == ("line 3: corrupt: expected a row that fits its crc32",)
+    assert check.problems == ("line 3: corrupt: expected a row that matches its crc32",)
 
 
 def test_every_wrong_byte_shows(tmp_path: Path) -> None:

@@ -381,7 +381,7 @@ def test_the_corners_of_a_half_car_take_them() -> None:
     ("def pull(p, seen):\n    return np.log(-p.size)\n", "Between.BODY_AND_WHEEL, pull, p",
      "expected force to return finite numbers"),
     ("def pull(p, seen):\n    return eval('1.0')\n", "Between.BODY_AND_WHEEL, pull, p", "can be compiled: Untyped"),
-    ("", "Between.BODY_AND_WHEEL, lambda p, seen: self.size, p", "that knows its numbers by p alone"),
+    ("", "Between.BODY_AND_WHEEL, lambda p, seen: self.size, p", "that gets its parameters by p alone"),
     ("", "Between.BODY_AND_WHEEL, lambda p: 1.0, p", "expected force to be a function of (p, seen)"),
     ("def pull(p, seen):\n    return 1.0\n", "'wheel', pull, p", "expected with_law to get one of Between.BODY_AND_WH"),
     ("def pull(p, seen):\n    return 1.0\n", "Between.BODY_AND_WHEEL, pull, p, memory=(0.0,)",

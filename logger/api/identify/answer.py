@@ -140,13 +140,13 @@ class Identification(CommandResult):
         vehicles = [path for paths in written.values() for path in paths if path.suffix == ".yaml"]
         if not self.converged or question.road != MEASURED or not (self.cannot_tell or vehicles):
             return ""
-        what = "where the model is off" if self.cannot_tell else "what these numbers leave unexplained"
+        what = "where the model is off" if self.cannot_tell else "what these parameters leave unexplained"
         car = vehicles[0] if vehicles else question.vehicle
         return f"Next, {what}: ridelog compare --vehicle {car} {question.named().replace(', ', ' ')}"
 
     def write(self, path: Path, option: str = "--out") -> None:
         """Write the fitted vehicle, its standard errors as comments."""
-        comments = [f"# {self.model.vehicle.name} with numbers fitted by ridelog identify; error "
+        comments = [f"# {self.model.vehicle.name} with parameters fitted by ridelog identify; error "
                     f"{self.error_before:.4f} before, {self.error_after:.4f} after"]
         comments += [f"# {name}: {value:.6g}, standard error {self.standard_errors[name]:.2g}"
                      for name, value in self.parameters.items()]

@@ -119,7 +119,7 @@ class Bench:
             found = diagnose(self.posterior(searches=True), effects, self.model.effects, notify, last)
             if found.verdict or not (found.beyond and found.exceeds_noise) or not self.timed:
                 return found
-            notify("the runs contradict the vehicle's file: searching with its numbers unknown")
+            notify("the runs contradict the vehicle's file: searching with its parameters unknown")
             wide = replace(self, tolerance=self.tolerance.widened())
             again = diagnose(wide.posterior(searches=True), effects, self.model.effects, notify)
         return replace(again, contradicted=tuple(found.beyond)) if again.verdict else found
@@ -315,11 +315,11 @@ def _shown_on_rig(effect: Effect, of_part: bool) -> Effect:
         found.shown_by = ("excite it well above its natural frequencies" if isinstance(effect, SensorEffect) else
                           "move it faster and farther, at several amplitudes, through its natural frequencies")
     elif any(unit in ("s", "m2") for unit in units):
-        found.shown_by = "move it by one amplitude, at rates far below, near and far above where its force changes"
+        found.shown_by = "move it at one amplitude, at rates far below, near and far above where its force changes"
     elif any(one.name.endswith("_m") for one in effect.parameters) or "m3" in units:
-        found.shown_by = "move it at one rate, by amplitudes far below, near and far above where its force changes"
+        found.shown_by = "move it at one rate, at amplitudes far below, near and far above where its force changes"
     else:
-        found.shown_by = "move it both ways by one amplitude, at frequencies that are far apart"
+        found.shown_by = "move it both ways at one amplitude, at frequencies that are far apart"
     return found
 
 
@@ -420,8 +420,8 @@ def lab_drives(runs: Runs, notify: Notify = silent) -> list[drive_file.DriveOnRo
     places = [one.path if isinstance(one, DrivenRun) else Path(one).resolve() for one in given]
     if again := next((one for number, one in enumerate(given) if places[number] in places[:number]), None):
         raise BadInput(
-            f"{again.path if isinstance(again, DrivenRun) else again}: expected each run once, and under a name "
-                       "of its own")
+            f"{again.path if isinstance(again, DrivenRun) else again}: expected each run once, with a name of "
+                       "its own")
     return [drive_file.DriveOnRoad(**{one.name: getattr(run, one.name) for one in fields(drive_file.Drive)},
                                    track=run.track) for run in [run_on_road(one, notify) for one in given]
             if run.track is not None]

@@ -298,7 +298,7 @@ def _another_car(word: str, model: CarModel, runs: SimulatedRuns, predictions: S
     found = another_car(runs.runs, model.vehicle, model.effects, mains, numbers)
     if found is not None and not _explained_by_an_effect(found, model, known, numbers):
         far = list(found.shares.items())[:_NAMED]
-        more = f" and {len(found.shares) - _NAMED} more numbers far off" if len(found.shares) > _NAMED else ""
+        more = f" and {len(found.shares) - _NAMED} more parameters far off" if len(found.shares) > _NAMED else ""
         yield (f"{runs.runs[0].name}: expected a drive of the car in {word}, found one of another car: the file's "
                f"model explains next to nothing of it (NRMSE {found.error:.2f}), a model with "
                f"{', '.join(f'{name} {share:+.0%}' for name, share in far)}{more} leaves {found.found_error:.2f}. "
@@ -436,7 +436,7 @@ def driven_stretches(drive: DriveOnRoad) -> list[Run]:
     parts = driven_parts(drive, driven)
     whole = len(parts) == 1 and parts[0] == slice(0, len(drive.time_s))
     cut = LeftOut((len(drive.time_s) - sum(part.stop - part.start for part in parts)) / drive.rate_hz, "s",
-                  "in which nothing drove it or nothing was read")
+                  "without excitation or readings")
     def main(part: slice) -> Array:
         samples = drive.accel_z_mps2[part]
         return samples if zero_is_known(drive.facts.main, drive.track) else samples - samples.mean()
@@ -498,8 +498,8 @@ def check_channels(drive: Drive, file: Path, vehicle: Vehicle) -> None:
     to_judge = read if drive.usable is None or drive.guessed else []
     for signal, samples in ((signal, every[whole]) for signal, every in to_judge):
         if (share := float(at_ends(samples).mean())) > _CLIPPED_SHARE:
-            raise BadInput(f"{file}: {signal.name}: expected readings, found {share:.0%} of them at the largest and "
-                           "the smallest one exactly, as from a saturated amplifier. Set a wider range, or add a "
+            raise BadInput(f"{file}: {signal.name}: expected readings, found {share:.0%} of them exactly at the "
+                           "largest or smallest value, as from a saturated amplifier. Set a wider range, or add a "
                            "column usable, 2 there and 1 elsewhere (1 everywhere if this is right)")
         if signal.measures == "force" and (still := longest_still(samples, drive.rate_hz)):
             from_s, to_s = (float(drive.time_s[whole][min(one, len(samples) - 1)]) for one in still)

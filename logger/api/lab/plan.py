@@ -145,7 +145,7 @@ def _longest_road(bench: Bench | None) -> Track | None:
 
 
 _MOST_NEXT, _MOST_GAINS = 5, 4
-SENSOR_HINT = ("Assumed noise: a second accelerometer as the first one, a travel sensor 0.5 mm, a gyroscope "
+SENSOR_HINT = ("Assumed noise: a second accelerometer like the first, a travel sensor 0.5 mm, a gyroscope "
                "0.001 rad/s.")
 _OBSTACLES = {"bump": "a speed bump {height_m:g} m high and {width_m:g} m long",
               "plate": "a plank {height_m:g} m high and {length_m:g} m long"}

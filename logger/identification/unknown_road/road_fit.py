@@ -87,7 +87,7 @@ class RoadProblem:
     def __init__(self, car: ResponseCar, roads: Sequence[Sequence[RoadDrive]], options: Options) -> None:
         self.car, self.options, self.free = car, options, list(car.parameters)
         if not self.free:
-            raise ValueError("expected at least one free number")
+            raise ValueError("expected at least one free parameter")
         self.roads = Roads(car, roads, options)
         self.names = [*(one.name for one in self.free), *self.roads.names]
         self.coordinates = Coordinates(self.free)

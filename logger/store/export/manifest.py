@@ -50,7 +50,7 @@ def list_lines(blocks: Iterable[bytes]) -> Iterator[str]:
         elif next(lines, None) is not None:
             raise ValueError("expected nothing after the line '# N files, list SHA-256'")
         elif last[2] != digest.hexdigest():
-            raise ValueError("changed: the list does not fit the checksum in its last line")
+            raise ValueError("changed: the list does not match the checksum in its last line")
         else:
             return
     raise ValueError(_CUT)

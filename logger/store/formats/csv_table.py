@@ -232,7 +232,9 @@ def _text(data: bytes, file: str) -> bytes:
         data = data.decode(code, "replace").encode("utf-8").removeprefix(b"\xef\xbb\xbf")
     if (zero := data.find(b"\0")) >= 0:
         line = data.count(b"\n", 0, zero) + 1
-        raise BadInput(f"{file}:{line}: expected text with a table of numbers, found bytes that are no text")
+        kind = ("a PPF file: save it as ERD with ProVAL" if file.lower().endswith(".ppf") else
+                "bytes that are not text")
+        raise BadInput(f"{file}:{line}: expected text with a table of numbers, found {kind}")
     return data.replace(b"\r\n", b"\n").replace(b"\r", b"\n") if b"\r" in data else data
 
 
@@ -444,7 +446,9 @@ def _taken_by(names: Names, header: str) -> str:
     that it wants, so that nobody is sent to the command that has just refused, and no profile that lacks places."""
     known = "a profile: ridelog iri" * ("distance_m,lat" not in header) if names == _PROFILE else next(
         (words for columns, words in _TAKEN_BY if columns <= set(names)), "")
-    return f"; this is {known} takes it" if known else ""
+    if known:
+        return f"; this is {known} takes it"
+    return "; ridelog extract --csv makes runs of other recordings" if "accel_z_mps2,speed_mps" in header else ""
 
 
 def _listed(names: Names) -> str:

@@ -124,7 +124,7 @@ _AT_THE_END = re.compile(r"(?:[(\[]\s*([^()\[\]]+?)\s*[)\]]\s*:?|_([a-z0-9]+))\s
 """A unit in brackets, or after an underscore as in ``speed_mps``."""
 _LIKELY = {"t": r"t|time.*|timestamp.*|seconds.*|.*\btime",
            **{axis: rf"(.*[ _.])?acc(el\w*)?[ _.]?{axis}([ _(\[].*)?|a?{axis}" for axis in AXES},
-           "lat": r".*lat(itude)?\b.*", "lon": r".*lon(g|gitude)?\b.*", "speed": r".*(speed|velocity).*"}
+           "lat": r".*lat(itude)?\b.*", "lon": r".*lon(g|gitude)?\b.*", "speed": r".*(speed|velocity).*|v\b.*"}
 
 
 @dataclass(frozen=True)
@@ -261,11 +261,10 @@ def _by_name(there: list[str], named: Named) -> Recognised | None:
 
 def advice(names: Sequence[str]) -> str:
     """What to give for a header that is not known: the option, filled in as well as names allow."""
-    chosen = []
-    for role, likely in _LIKELY.items():
-        fits = [name for name in names if re.fullmatch(likely, plain(name))]
-        if fits:
-            chosen.append(f"{role}={fits[0].strip()}" + ("" if unit_in(fits[0], role) or role in PLACE else ":UNIT"))
+    fits = {role: [name for name in names if re.fullmatch(likely, plain(name))] for role, likely in _LIKELY.items()}
+    alone = not fits["x"] and not fits["y"]  # the axis of a record of one axis is up
+    chosen = [f"{'up' if alone and role == 'z' else role}={found[0].strip()}"
+              + ("" if unit_in(found[0], role) or role in PLACE else ":UNIT") for role, found in fits.items() if found]
     example = ",".join(chosen) if len(chosen) > 1 else "t=TIME:ms,x=X:g,y=Y:g,z=Z:g,lat=LAT,lon=LON,speed=SPEED:km/h"
     return f'--columns "{example}"'
 

@@ -153,11 +153,11 @@ def hold_doubts(t_s: Array, held: Bools, file: str) -> list[Doubt]:
                        "at a higher rate")
     if lasted_s[row] > LONGEST_HOLE_S:
         raise BadInput(f"{place(file, int(first[row]))}: expected no hole above {LONGEST_HOLE_S:g} s, found a sensor "
-                       f"that stands still on all axes from {begin_s[row]:.6g} to {end_s[row]:.6g} s: cut the record "
+                       f"frozen on all axes from {begin_s[row]:.6g} to {end_s[row]:.6g} s: cut the record "
                        "there")
     total_s = float(lasted_s.sum())
-    return [Doubt("held", f"the sensor stands still on all axes for {total_s:.2g} s in {counted(len(first), 'place')}, "
-                  f"the first at {begin_s[0]:.6g} s: the ride is harder than the values say",
+    return [Doubt("held", f"the sensor is frozen on all axes for {total_s:.2g} s in {counted(len(first), 'place')}, "
+                  f"the first at {begin_s[0]:.6g} s: the true values are higher",
                   {"seconds": total_s, "places": len(first)})]
 
 
@@ -167,10 +167,10 @@ def with_marks(record: EvenRecord, usable: Array | None) -> EvenRecord:
         return record
     share, clipped = float((usable == NO_READING).mean()), int(np.count_nonzero(usable == CLIPPED))
     doubts = [Doubt("holes", f"{share:.1%} of the samples are no readings, as the column usable says, and lie on "
-                    "straight lines: the ride is harder than the values say", {"share": share})]
+                    "straight lines: the true values are higher", {"share": share})]
     doubts = doubts if share > _HOLES else []
     doubts += [Doubt("range_end", f"{clipped} samples stand at an end of the sensor's range, as the column usable "
-                     "says: the ride is harder than the values say; record with a larger range", {"samples": clipped})
+                     "says: the true values are higher; record with a larger range", {"samples": clipped})
                ] if clipped else []
     return replace(record, doubts=(*record.doubts, *doubts))
 
@@ -215,7 +215,7 @@ def _resampled(t_s: Array, samples: Array, names: Mapping[str, Array], others: M
     holes = steps[steps > HOLE_STEPS / own_hz].sum() / (taken_s[-1] - taken_s[0])
     if holes > _HOLES:
         doubts = [*doubts, Doubt("holes", f"{holes:.1%} of the time lies in holes, across which straight lines were "
-                                 "laid: the ride is harder than the values say", {"share": float(holes)})]
+                                 "laid: the true values are higher", {"share": float(holes)})]
     wanted_hz = rate_hz if rate_hz != OWN_RATE else max(LEAST_RATE_HZ, own_hz)
     laid = on_even_grid(taken_s, taken, own_hz, wanted_hz)
     grid_s = taken_s[0] + np.arange(len(laid)) / wanted_hz
@@ -274,8 +274,8 @@ def still_doubts(names: Iterable[str], t_s: Array, samples: Array, held: Bools) 
     doubts = []
     begin_s = repeated_samples.still_until_s(t_s, samples) - t_s[0]
     if begin_s > LONGEST_HOLE_S and not held[1] and np.ptp(samples, axis=0).any():
-        doubts.append(Doubt("held", f"the sensor stands still on all axes for the first {begin_s:.3g} s: a parked car, "
-                            "or it was not read; the ride after it is harder than the values say: cut it off",
+        doubts.append(Doubt("held", f"the sensor is frozen on all axes for the first {begin_s:.3g} s: a parked car, "
+                            "or it was not read; it lowers the values: cut it off",
                             {"seconds": float(begin_s), "places": 1}))
     for name, values in zip(names, samples.T, strict=True):
         if np.ptp(values) == 0.0:
@@ -290,8 +290,8 @@ def still_doubts(names: Iterable[str], t_s: Array, samples: Array, held: Bools) 
         if long.any():
             lasts_s = float((t_s[end - 1] - t_s[first - 1])[long].sum())
             doubts.append(
-                Doubt("held", f"{name} alone stands still for {lasts_s:.3g} s, first at {t_s[first[long][0] - 1]:.6g} "
-                      "s: what is said of it is too low; check that it was read", {"axis": name, "seconds": lasts_s}))
+                Doubt("held", f"{name} alone is frozen for {lasts_s:.3g} s, first at {t_s[first[long][0] - 1]:.6g} "
+                      "s: its values are too low; check that it was read", {"axis": name, "seconds": lasts_s}))
     return doubts
 
 

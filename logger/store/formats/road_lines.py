@@ -27,7 +27,7 @@ def read_geojson(path: Path | str) -> dict[str, Any]:
     try:
         content = json.loads(read_bounded(path, MAX_BYTES))
     except (ValueError, RecursionError) as error:
-        raise BadInput(f"{path}: expected GeoJSON, found what is no JSON ({error})") from None
+        raise BadInput(f"{path}: expected GeoJSON, found text that is not JSON ({error})") from None
     if not isinstance(content, dict) or not isinstance(content.get("type"), str):
         raise BadInput(f"{path}: expected GeoJSON, an object with a type, such as a FeatureCollection")
     return content

@@ -103,7 +103,7 @@ def set_aside_if_possible(files: FileSystem, path: Path, why: str, warn: Warn) -
     try:
         set_aside(files, path, why, warn)
     except OSError as error:
-        warn(f"{path.name}: {why}; it cannot be renamed either ({disk_words(error)}) and is passed over")
+        warn(f"{path.name}: {why}; it cannot be renamed either ({disk_words(error)}) and is skipped")
 
 
 def names_set_aside(directory: Path) -> list[str]:
@@ -121,7 +121,7 @@ class FolderLock:
         except BlockingIOError:
             os.close(self._descriptor)
             raise BadInput(
-                f"{folder}: another ridelog writes here (see ridelog status); expected a folder of its own") from None
+                f"{folder}: another ridelog is writing here (see ridelog status); give each its own folder") from None
 
     def __enter__(self) -> FolderLock:
         return self

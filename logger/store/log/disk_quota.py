@@ -358,14 +358,14 @@ class DiskQuota:
         """Why no raw bytes may be recorded; empty: they may."""
         if self._read_only:
             return atomic_file.READ_ONLY
-        return "little room is left, and it is kept for the logs" if self._dumps_held else ""
+        return "the little room left is kept for the logs" if self._dumps_held else ""
 
     @property
     def why_no_logs(self) -> str:
         """Why no rows may be written; empty: they may."""
         if self._read_only:
             return atomic_file.READ_ONLY
-        return "no room is left, and nothing that could be removed" if self._logs_held else ""
+        return "no room is left, and nothing can be removed" if self._logs_held else ""
 
     def _measure(self) -> int:
         room = self._files.free_bytes(self._directory) - self._limits.floor_bytes

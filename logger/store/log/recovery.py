@@ -142,7 +142,7 @@ def repair_part(files: FileSystem, part: Path, limit: int | None, clock: sidecar
     elif tally.rows or len(logs) > 1 or _explains_a_gap(files, part, tally, limit):
         _finish_copy(files, part, logs, _facts_of(files, part, warn), tally, clock, limit)
         if tally.contradictions:
-            why = f"{tally.contradictions} of its rows are others than those in {finished.name}"
+            why = f"{tally.contradictions} of its rows differ from those in {finished.name}"
             atomic_file.set_aside(files, part, why, warn)
         else:
             files.remove(part)

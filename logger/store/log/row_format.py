@@ -143,7 +143,7 @@ def _word(name: str, known: re.Pattern[str], meaning: str) -> LogColumn:
 
 def _read_word(text: str, known: re.Pattern[str]) -> str:
     if not known.fullmatch(text):
-        raise BadRow(f"expected a word of a logger's, found {text[:_SHOWN]!a}")
+        raise BadRow(f"expected a word that a logger writes, found {text[:_SHOWN]!a}")
     return text
 
 
@@ -219,7 +219,7 @@ def parse_row(text: str) -> WindowRecord:
     """
     body, _, check = text.rpartition(",")
     if f"{zlib.crc32(body.encode('utf-8', 'replace')):08x}" != check:
-        raise BadRow("expected a row that fits its crc32")
+        raise BadRow("expected a row that matches its crc32")
     fields = body.split(",")
     if len(fields) not in _COUNTS:
         raise BadRow(f"expected {len(COLUMNS) + 1} columns, found {len(fields) + 1}")

@@ -211,7 +211,7 @@ def load_sidecar(log: Path, files: FileSystem | None = None) -> Sidecar | None:
     try:
         found = json.loads(text)
     except RecursionError:
-        raise ValueError("expected no such deep nesting") from None
+        raise ValueError("expected less deep nesting") from None
     except ValueError:
         raise ValueError("expected a JSON object") from None
     if not isinstance(found, dict):
@@ -219,7 +219,7 @@ def load_sidecar(log: Path, files: FileSystem | None = None) -> Sidecar | None:
     content = {key: value for key, value in found.items() if key not in _SEAL}
     is_sealed = not _SEAL.isdisjoint(found)
     if is_sealed and not _fits(found, content):
-        raise ValueError("expected content that fits its checksum")
+        raise ValueError("expected content that matches its checksum")
     return Sidecar(content, is_sealed and content.get(UNCHECKED) is not True)
 
 

@@ -20,7 +20,7 @@ class BumpStop(ForceEffect):
         AXLE,
     )
     source = "J. Reimpell, H. Stoll, J. W. Betzler, The Automotive Chassis (2001), 5.3: additional springs"
-    signature = "short hard blows upward where the suspension is most compressed; elsewhere the model fits"
+    signature = "short hard impacts upward where the suspension is most compressed; elsewhere the model fits"
     shown_by = "drive over a large bump fast enough for the suspension to bottom out"
 
     def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:

@@ -42,11 +42,11 @@ class Hysteresis(ForceEffect):
         Parameter("yield_force_n", 100.0, 0.0, 5000.0, 0.0, Scale.LINEAR, (30.0, 150.0),
                   "at which each suspension slides"),
         Parameter("yield_travel_m", 0.002, 0.0001, 0.05, None, Scale.LOG, (0.0005, 0.004),
-                  "over which the force would grow to that at its initial stiffness"),
+                  "over which the initial stiffness would reach that force"),
         Parameter("sharpness_ratio", 1.0, 0.2, 10.0, None, Scale.LOG, (0.5, 2.0),
                   "exponent: the higher, the sharper the yield", default=1.0),
         Parameter("reversal_ratio", 1.0, 1.0, 4.0, None, Scale.LINEAR, (1.0, 2.0),
-                  "stiffness when it is let go over the initial one", default=1.0),
+                  "stiffness in unloading over the initial one", default=1.0),
         AXLE,
     )
     source = ("R. Bouc, Proc. 4th Conf. on Nonlinear Oscillation, Prague (1967) 315; Y.-K. Wen, J. Eng. Mech. Div. "

@@ -40,13 +40,13 @@ def test_a_list_that_is_not_whole_is_refused(manifest: Manifest, data: st.DataOb
     try:
         assert read_manifest([damaged]) == manifest
     except ValueError as error:
-        assert "expected" in str(error) or "does not fit" in str(error)
+        assert "expected" in str(error) or "does not match" in str(error)
 
 
 @settings(max_examples=300)
 @given(st.binary(max_size=300))
 def test_any_bytes_are_read_or_refused(data: bytes) -> None:
-    with pytest.raises(ValueError, match=r"expected|does not fit"):
+    with pytest.raises(ValueError, match=r"expected|does not match"):
         read_manifest([data])
 
 

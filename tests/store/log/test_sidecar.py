@@ -51,7 +51,7 @@ def test_another_layout_of_the_same_content_is_as_good(log: Path) -> None:
     {"sensor": {"driver": "bma220", "verified": False}}, {"sha256": "0" * 64}, {"sha256": None}, {"more": 1}])
 def test_a_changed_sidecar_is_refused(log: Path, change: dict[str, Any]) -> None:
     check = store(log, stored(log) | change)
-    assert check.problems == ("sidecar: expected content that fits its checksum",)
+    assert check.problems == ("sidecar: expected content that matches its checksum",)
     with pytest.raises(ValueError, match="checksum"):
         read_sidecar(log)
 
@@ -59,7 +59,7 @@ def test_a_changed_sidecar_is_refused(log: Path, change: dict[str, Any]) -> None
 def test_one_without_its_checksum_is_changed(log: Path) -> None:
     content = stored(log)
     del content["sha256"]
-    assert store(log, content).problems == ("sidecar: expected content that fits its checksum",)
+    assert store(log, content).problems == ("sidecar: expected content that matches its checksum",)
 
 
 def test_one_of_an_older_version_is_read_and_said_to_be_unchecked(log: Path) -> None:

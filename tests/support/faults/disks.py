@@ -294,7 +294,7 @@ def nothing_is_exported(folder: Path, step: int) -> Found:
 
 
 def name_that_is_a_folder(folder: Path, name: str) -> Found:
-    """Something under the name of an old dump or log that is no file: it is passed over, the rest makes room."""
+    """Something under the name of an old dump or log that is no file: it is skipped, the rest makes room."""
     folder = folder / "log"
     used = old_files(folder)
     (folder / name).mkdir()
@@ -390,7 +390,7 @@ HAZARDS = (
            "raw dumps stop first, then old dumps go, and it is said; a log never goes; then logs wait", "as promised",
            nothing_is_exported, (3000, 1000), 1),
     Hazard("folder under the name of an old file", "a folder called as a dump or a log lies among them",
-           "it is passed over, and the rest makes room", "as promised", name_that_is_a_folder,
+           "it is skipped, and the rest makes room", "as promised", name_that_is_a_folder,
            ("00000.dump.gz", "00000-001.csv")),
     Hazard("card fills up and is emptied", "its size changes during a drive",
            "dumps stop, then the log waits in memory, then both go on; no row is lost", "as promised",

@@ -233,7 +233,7 @@ HAZARDS = (
            "killed service: EIO on opening, reading, removing, renaming or writing it, or on all; no permission; "
            "an inode that cannot even be looked at; a folder, a pipe, a link to nothing or to itself in its place",
            "a new session begins and takes rows, under a number that was not used; what is in the way gets another "
-           "name or is passed over, and `status` names it; no row of the session before is lost, and on a sound disk "
+           "name or is skipped, and `status` names it; no row of the session before is lost, and on a sound disk "
            "the folder passes `ridelog verify`", "{asides.total:.0f} put aside", start_beside,
            tuple(product(NAMES, (*THINGS, *FAULTS)))),
 )

@@ -20,11 +20,11 @@ class FrictionWithMemory(Family):
             Parameter("yield_force_n", 100.0, 0.0, 20000.0, 0.0, Scale.LINEAR, (100.0,),
                       "at which each suspension slides"),
             Parameter("yield_travel_m", 0.002, 0.0002, 0.05, None, Scale.LOG, (0.0008, 0.003, 0.01),
-                      "over which the force would grow to that at its initial stiffness"),
+                      "over which the initial stiffness would reach that force"),
             Parameter("sharpness_ratio", 1.0, 1.0, 1.0, None, Scale.LINEAR, (1.0,),
                       "exponent: the higher, the sharper the yield", default=1.0),
             Parameter("reversal_ratio", 1.0, 1.0, 1.0, None, Scale.LINEAR, (1.0,),
-                      "stiffness when it is let go over the initial one", default=1.0))
+                      "stiffness in unloading over the initial one", default=1.0))
         return [self.draft(parameters, handed_on(states=1), f"from {hysteresis.__name__} import force, rates",
                            title="friction that yields before it slides", at="loop")]
 

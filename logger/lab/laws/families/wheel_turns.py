@@ -34,7 +34,7 @@ _RADII_M = (0.1, 0.5)
 
 class WheelTurns(Family):
     title = "a force that repeats with each turn of the wheels"
-    source = "a mass that turns off its axis (J. P. Den Hartog, Mechanical Vibrations, 1956, section 6.1)"
+    source = "a rotating imbalance (J. P. Den Hartog, Mechanical Vibrations, 1956, section 6.1)"
     signature = "it repeats along the road, whatever the speed, and grows with the square of the speed"
     shown_by = "drive a smooth road at two steady speeds"
     by_axle = False
