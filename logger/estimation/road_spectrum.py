@@ -13,6 +13,7 @@ from math import exp, log
 import numpy as np
 
 from logger.arrays import Array
+from logger.estimation.scored_variances import LARGEST_STEP
 from logger.roads.iso8608 import CM3_M3, REFERENCE_N0_CPM, gd_n0_from_iri
 
 PIVOT_CPM = 0.2
@@ -24,7 +25,6 @@ FLATTENED_BELOW_CPM = 0.01
 # common, ISO 8608, annex C), and how far both may have wandered since the last stretch.
 _COMMON_DEVIATIONS, _STEP_DEVIATIONS = (1.8, 0.3), (0.3, 0.1)
 _WAVINESS_RANGE = (1.2, 3.2)
-_LARGEST_STEP = 0.7
 
 
 @dataclass(frozen=True)
@@ -89,5 +89,5 @@ def learnt(
             precision = np.array(deviations) ** -2.0
             gradient -= precision * [now.log_level - centre.log_level, now.waviness - centre.waviness]
             curvature += np.diag(precision)
-    level, waviness = np.clip(np.linalg.solve(curvature, gradient), -_LARGEST_STEP, _LARGEST_STEP)
+    level, waviness = np.clip(np.linalg.solve(curvature, gradient), -LARGEST_STEP, LARGEST_STEP)
     return RoadSpectrum(now.log_level + float(level), float(np.clip(now.waviness + waviness, *_WAVINESS_RANGE)))

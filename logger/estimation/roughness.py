@@ -28,7 +28,7 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from logger.arrays import Array, Bools, Complex
-from logger.estimation.scored_variances import ScoredVariances
+from logger.estimation.scored_variances import FORGOTTEN, LARGEST_STEP, ScoredVariances
 
 LENGTHS_M = np.array([10.0, 100.0, 10_000.0])
 # Of the log variance, before a road is known: half of all roads between 1.1 and 5.7 m/km make the last.
@@ -40,10 +40,8 @@ _MOST_CELLS = 256  # at once: 2 km, and blocks of 20 s are shorter. A place that
 _REACH_M = 1.0
 _COMMON = 4.0  # points, before the scatter is known, and never fewer
 _MOST_COMMON = 100.0  # w keeps within 14 %, which costs nothing
-_FORGOTTEN = 0.02  # per block, of what was heard of scatter and variances: they are known from the last 100 s
 _LEAST_OF_MEAN = 0.1  # a place that shows less says nothing of the scatter
 _TAKEN_OVER = 0.6  # of a new scale, so that it does not overshoot
-_LARGEST_STEP = 0.7
 _SMALLEST_LOG, _LARGEST_LOG = -3.0, 16.0  # of w
 _LEAST_INFORMATION = 1e-9
 _TABLE_STEP = 0.5
@@ -231,7 +229,7 @@ class RoadLevels:
         self._level = _Level(begin, level, shown, information, edge, prior, state, state_covariance)
         pull = self._level.pull(mean)
         way = 1.0 if self.curvature is None else min(_WAY, _MOST_OF_CURVATURE * self.curvature)
-        step = np.clip(way * (mean + prior @ pull - now), -_LARGEST_STEP, _LARGEST_STEP)
+        step = np.clip(way * (mean + prior @ pull - now), -LARGEST_STEP, LARGEST_STEP)
         level[edge - begin:] = np.clip(now + step, _SMOOTHEST, _ROUGHEST)
         self.moved = float(np.sqrt(np.mean(step**2)))
         if learns:
@@ -271,8 +269,8 @@ class RoadLevels:
         relative = power[inside] / np.maximum(weight[inside], _LEAST_OF_MEAN * mean)
         found = float(np.var(relative) / np.mean(relative) ** 2) - chance
         usual = 2 / _COMMON
-        self._scattered += mean * min(max(found, -usual), usual) - _FORGOTTEN * self._scattered
-        self._heard += mean - _FORGOTTEN * self._heard
+        self._scattered += mean * min(max(found, -usual), usual) - FORGOTTEN * self._scattered
+        self._heard += mean - FORGOTTEN * self._heard
         scatter = (self._scattered + _COMMON * usual) / (self._heard + _COMMON)
         self._common = 2 / max(scatter, 2 / _MOST_COMMON)
 

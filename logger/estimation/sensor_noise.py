@@ -29,6 +29,7 @@ import numpy as np
 
 from logger.arrays import Array
 from logger.estimation.normal_distribution import probability_between
+from logger.estimation.scored_variances import LARGEST_STEP
 
 NOISE_MPS2 = 0.05
 """Of a reading, where nobody says another [m/s2]; where it is to be learnt, a guess to begin with."""
@@ -56,7 +57,6 @@ are all that tells how much noise there is; were they no less probable with less
 # Of readings that are not coarse, block by block: how far the noise is from the sensor's.
 _NOISE_DEVIATION = 0.5
 _LEAST_LOG_NOISE = -2.0  # a sensor that hangs must not be taken for one without noise
-_LARGEST_STEP = 0.7
 _BAND_SHARE = 0.76  # recorders are flat to 38 of 50 Hz
 _SECOND = 100
 
@@ -271,7 +271,7 @@ def with_noise(log_noise: float, residual_mps2: Array, weight: Array, resolved_w
     if not free:
         return log_noise
     step = (slope - log_noise / _NOISE_DEVIATION**2) / (0.5 * free + _NOISE_DEVIATION**-2.0)
-    return max(log_noise + float(np.clip(step, -_LARGEST_STEP, _LARGEST_STEP)), _LEAST_LOG_NOISE)
+    return max(log_noise + float(np.clip(step, -LARGEST_STEP, LARGEST_STEP)), _LEAST_LOG_NOISE)
 
 
 def noise_slope(residual_mps2: Array, weight: Array, resolved_waves: float) -> tuple[float, float]:
