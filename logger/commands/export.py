@@ -23,10 +23,10 @@ _PULL = "it may be pulled"
 
 @dataclass(frozen=True, kw_only=True)
 class ExportQuestion(Question):
-    """Copy finished logs to a USB stick: checked, atomic, repeatable.
+    """Copy finished logs and recordings to a USB stick: checked, atomic, repeatable.
 
       sudo ridelog export --to /media/RIDELOG
-      sudo ridelog export --to /media/RIDELOG --dumps
+      sudo ridelog export --to /mnt/backup --json
 
     Everything goes into ridelog/<this logger> on the stick, with a manifest that 'ridelog verify' checks. What is there
     already is read and left alone. If the settings pair the logger with sticks, only a copy to a paired one counts as
@@ -36,7 +36,6 @@ class ExportQuestion(Question):
     to: Annotated[Path | None, Option("the stick, or any other folder", metavar="DIR", read=Path)] = None
     logs: Annotated[Path | None, Option("logs (default: the service's)", metavar="LOGDIR", read=Path,
                                         flag="--from")] = None
-    dumps: Annotated[bool, Option("also the recorded dumps")] = False
     config: Annotated[Path | None, Option("settings of the service", metavar="FILE", read=Path)] = None
     # What follows is typed by nobody: systemd/ridelog-export@.service passes it.
     unmounted: Annotated[Path | None, Hidden("say in the note that the stick that was mounted here may be pulled",
@@ -71,7 +70,7 @@ def exported(asked: ExportQuestion) -> Checked:
         logs = asked.logs if asked.logs is not None else config.log.directory
         if asked.logs is None and asked.to.is_dir() and not logs.is_dir():
             raise BadInput(f"{logs}: expected a folder with the logs; --from LOGDIR names another")
-        result = export(logs, asked.to, asked.dumps, board.progress, config.pairing, by_hand=not asked.mounted)
+        result = export(logs, asked.to, board.progress, config.pairing, by_hand=not asked.mounted)
     except RidelogError as error:
         board.report("unmounting", False, str(error))
         raise

@@ -24,7 +24,7 @@ pytestmark = pytest.mark.usefixtures("folders_as_sticks")
 def logs(tmp_path: Path) -> Path:
     folder = tmp_path / "log"
     folder.mkdir()
-    for name in ("00001-001.csv", "00001-001.json", "00001.dump"):
+    for name in ("00001-001.csv", "00001-001.json"):
         (folder / name).write_text("content\n")
     return folder
 
@@ -57,7 +57,8 @@ def test_a_person_is_shown_what_was_copied(logs: Path, stick: Path, capsys: pyte
 
 
 def test_a_program_gets_one_object(logs: Path, stick: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["export", "--from", str(logs), "--to", str(stick), "--dumps", "--json"]) == 0
+    (logs / "00001.dump").write_text("content\n")
+    assert main(["export", "--from", str(logs), "--to", str(stick), "--json"]) == 0
     said = json.loads(capsys.readouterr().out)
     assert said["complete"] is True
     assert said["copied"] == ["00001-001.csv", "00001-001.json", "00001.dump"]

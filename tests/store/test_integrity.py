@@ -382,7 +382,7 @@ def stick(tmp_path: Path) -> Path:
     (tmp_path / "log").mkdir()
     (tmp_path / "stick").mkdir()
     log_in(tmp_path / "log", 1, 2, 3).close()
-    done = export(tmp_path / "log", tmp_path / "stick", dumps=False, report=lambda progress: None)
+    done = export(tmp_path / "log", tmp_path / "stick", report=lambda progress: None)
     assert done.logger is not None
     return tmp_path / "stick" / "ridelog" / done.logger
 

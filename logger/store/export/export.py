@@ -185,9 +185,9 @@ class _CardFault(Exception):
     """The card did not give a file."""
 
 
-def export(logs: Path, stick: Path, dumps: bool, report: Callable[[Progress], None], pairing: Pairing = NOT_PAIRED,
+def export(logs: Path, stick: Path, report: Callable[[Progress], None], pairing: Pairing = NOT_PAIRED,
            by_hand: bool = False) -> ExportResult:
-    """Copy the finished logs of a folder, and its finished recordings with ``dumps``, to a stick.
+    """Copy the finished logs and recordings of a folder to a stick.
 
     ``report`` is called before the first file and after each. What the stick or the card refuses is in the result.
     Raises BadInput for folders that are not there, or where the copies would lie in the logs or around them, and
@@ -198,7 +198,7 @@ def export(logs: Path, stick: Path, dumps: bool, report: Callable[[Progress], No
         raise BadInput(f"{stick}: expected a place apart from the folder of logs, {logs}: the copies would go to "
                        f"{stick / manifest.FOLDER}")
     with _folder(stick, "to copy to, such as a mounted stick") as root, _folder(logs, "with the logs") as card:
-        names = finished_files(card, dumps)
+        names = finished_files(card)
         try:
             identity = logger_identity(card, logs)
         except OSError as error:
@@ -224,7 +224,7 @@ def export(logs: Path, stick: Path, dumps: bool, report: Callable[[Progress], No
             return ExportResult(identity, failures=tuple(Failure(name, reason) for name in names))
 
 
-def finished_files(card: DirectoryHandle, dumps: bool) -> list[str]:
+def finished_files(card: DirectoryHandle) -> list[str]:
     """Names of what can be exported, oldest first; each log is followed by its sidecar, recordings come last.
 
     What is being written has a name that ends in ``.part``.
@@ -234,7 +234,7 @@ def finished_files(card: DirectoryHandle, dumps: bool) -> list[str]:
                  if (file := OwnFile.of(name)) and not file.is_open)
     logs = [name for *_, name, kind in own
             if kind in (".csv", ".json") and str(Path(name).with_suffix(".csv")) in present]
-    return logs + [name for *_, name, kind in own if dumps and kind not in (".csv", ".json")]
+    return logs + [name for *_, name, kind in own if kind not in (".csv", ".json")]
 
 
 class _Export:

@@ -23,6 +23,7 @@ from ...support.faults.sticks import (
     HAZARDS,
     NAMES,
     OTHER_LOGGER,
+    RECORDING,
     a_card,
     a_stick,
     assert_all_there,
@@ -72,8 +73,9 @@ def test_finished_logs_and_their_sidecars_are_copied(logs: Path, stick: Path) ->
     assert (stick / OTHER_LOGGER).read_text() == "another car\n"
 
 
-def test_recordings_of_finished_sessions_go_along_when_asked(logs: Path, stick: Path) -> None:
-    assert run(logs, stick, dumps=True).copied == (*NAMES, "00002.dump.gz")
+def test_recordings_of_finished_sessions_go_along(logs: Path, stick: Path) -> None:
+    (logs / RECORDING).write_bytes(b"bytes\n")
+    assert run(logs, stick).copied == (*NAMES, RECORDING)
 
 
 def test_the_second_time_nothing_is_written(logs: Path, stick: Path) -> None:
@@ -99,8 +101,7 @@ def test_order_is_that_of_the_sessions_beyond_five_digits_too(tmp_path: Path) ->
     for name in (*logs, *dumps, "00007.json", "99999-003.json", "100001.dump.gz.part", "100001-001.csv.part"):
         (tmp_path / name).touch()
     with DirectoryHandle.at(tmp_path) as folder:
-        assert finished_files(folder, False) == logs
-        assert finished_files(folder, True) == logs + dumps
+        assert finished_files(folder) == logs + dumps
 
 
 def test_older_exports_of_files_that_the_card_no_longer_has_stay(logs: Path, stick: Path) -> None:
@@ -167,7 +168,7 @@ def test_what_a_cut_export_left_is_cleaned_and_nothing_else(logs: Path, stick: P
 
 def test_progress_goes_from_nothing_to_all(logs: Path, stick: Path) -> None:
     reported: list[Progress] = []
-    export(logs, stick, False, reported.append)
+    export(logs, stick, reported.append)
     assert reported[0] == Progress(0, len(NAMES))
     assert reported[-1] == Progress(len(NAMES), len(NAMES))
     assert [progress.done for progress in reported] == sorted(progress.done for progress in reported)
@@ -319,7 +320,8 @@ def test_an_export_of_nothing_passes_the_check_at_the_desk(tmp_path: Path) -> No
 
 
 def test_what_was_exported_passes_the_check_at_the_desk(logs: Path, stick: Path) -> None:
-    run(logs, stick, dumps=True)
+    (logs / RECORDING).write_bytes(b"bytes\n")
+    run(logs, stick)
     check = checked(stick)
     assert check.ok
     assert check.records_good == len(NAMES) + 1

@@ -37,11 +37,11 @@ def by_key(tmp_path: Path) -> Pairing:
 
 
 def plug_in(logs: Path, stick: Path, pairing: Pairing) -> ExportResult:
-    return export(logs, stick, False, quiet, pairing)
+    return export(logs, stick, quiet, pairing)
 
 
 def by_hand(logs: Path, stick: Path, pairing: Pairing) -> ExportResult:
-    return export(logs, stick, False, quiet, pairing, by_hand=True)
+    return export(logs, stick, quiet, pairing, by_hand=True)
 
 
 def files(stick: Path) -> dict[str, bytes]:

@@ -30,6 +30,7 @@ from .trials import Found, Hazard, found
 
 OTHER_LOGGER = "ridelog/0123456789ab/00001-001.csv"
 NAMES = ("00001-001.csv", "00001-001.json", "00002-001.csv", "00002-001.json")
+RECORDING = "00002.dump.gz"
 Put = Callable[[Path, Path], None]
 
 
@@ -114,10 +115,10 @@ class Stick:
 
 
 def a_card(root: Path) -> Path:
-    """Two finished logs, an open one, a recording of each session, and what else lies in such a folder."""
+    """Two finished logs, an open one and its recording, and what else lies in such a folder."""
     folder = root / "log"
     folder.mkdir()
-    for name in (*NAMES, "00003-001.csv.part", "00003-001.json", "00002.dump.gz", "00003.dump.gz.part", "last-session",
+    for name in (*NAMES, "00003-001.csv.part", "00003-001.json", "00003.dump.gz.part", "last-session",
                  "00004-001.csv.tmp", "notes.txt"):
         (folder / name).write_bytes(f"content of {name}\n".encode() * 10)
     return folder
@@ -135,9 +136,9 @@ def quiet(progress: Progress) -> None:
     pass
 
 
-def run(logs: Path, stick: Path, dumps: bool = False, pairing: Pairing = NOT_PAIRED) -> ExportResult:
+def run(logs: Path, stick: Path, pairing: Pairing = NOT_PAIRED) -> ExportResult:
     with patch("logger.store.export.export.are_on_one_disk", lambda *_: False):  # a folder stands for the stick
-        return export(logs, stick, dumps, quiet, pairing)
+        return export(logs, stick, quiet, pairing)
 
 
 def own(logs: Path, stick: Path) -> Path:
@@ -415,7 +416,8 @@ def odd_names(folder: Path, odd: str) -> Found:
 def names_of_fat(folder: Path, case: None) -> Found:
     """Long FAT names: none of ``"*/:<>?\\|`` and no end in a dot or a space; and no two alike but for their case."""
     logs, stick = a_card(folder), a_stick(folder / "stick")
-    run(logs, stick, dumps=True)
+    (logs / RECORDING).write_bytes(b"bytes\n")
+    run(logs, stick)
     names = [path.relative_to(stick).as_posix() for path in own(logs, stick).rglob("*")]
     assert not set("".join(names)) & set('"*:<>?\\|')
     assert not [name for name in names if name.endswith((".", " ")) or len(name) > 80]
@@ -504,15 +506,16 @@ class GrowingFile(Stick):
 
 def recording_that_grows(folder: Path, grows_by: int) -> Found:
     logs, stick = a_card(folder), a_stick(folder / "stick")
-    name = "00002.dump.gz"
+    name = RECORDING
+    (logs / name).write_bytes(b"bytes\n" * 10)
     file = GrowingFile(logs / name)
     file.grows_by = grows_by
     with put_in(file):
-        result = run(logs, stick, dumps=True)
+        result = run(logs, stick)
     assert [(failure.name, failure.reason) for failure in result.failures] == [
         (name, "card: the file changes while it is copied")]
     assert name not in exported_names(logs)
-    assert run(logs, stick, dumps=True).complete
+    assert run(logs, stick).complete
     assert_all_there(logs, stick, (*NAMES, name))
     return found()
 
