@@ -24,6 +24,9 @@ from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.effect import Chosen
 from logger.vehicle.named_parameters import free_parameters_of
 
+ROUNDS = 12
+"""So many rounds of steps lead to the end."""
+
 
 class BySquares:
     """Least squares over some runs (``kept``) of a posterior, of which none repeats another, all bands weighed alike.
@@ -91,7 +94,7 @@ class BySquares:
         loudest = max(self.kept, key=lambda one: float(self.whole.runs.runs[one].kept_mps2.std()))
         return self if len(self.kept) == 1 else BySquares(self.whole, [loudest])
 
-    def improved(self, start: State, rounds: int, to_reach: float = np.inf) -> tuple[float, State]:
+    def improved(self, start: State, rounds: int = ROUNDS, to_reach: float = np.inf) -> tuple[float, State]:
         """A state improved in so many rounds of steps, and its deviance; as long as those that are left may reach a
         deviance at the pace of the last."""
         least, best = self.deviance(start), start

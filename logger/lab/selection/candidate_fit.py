@@ -151,5 +151,5 @@ def _fit_by_squares(score: float, base: Baseline, start: State) -> CandidateFit:
     squares first."""
     by_squares = BySquares.of(base.posterior)
     begun = by_squares.at(start.effects, start.logs, start)
-    state = start if begun is None else by_squares.of_all(by_squares.improved(begun[1], 12)[1], start)
+    state = start if begun is None else by_squares.of_all(by_squares.improved(begun[1])[1], start)
     return CandidateFit.of(score, fit(LinearModel(base.posterior, state), rounds=3))

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 from zlib import crc32
 
@@ -26,9 +27,9 @@ from logger.lab.likelihood.posterior import NotSimulated, Posterior, State
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.whittle import LOWEST_HZ, UNEXPLAINED
 from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly
-from logger.lab.selection.evidence import INDISTINGUISHABLE
+from logger.lab.selection.evidence import IMITATION, INDISTINGUISHABLE
 from logger.lab.selection.screening import Baseline, Screened, Trial, effects_without
-from logger.lab.selection.stepwise import MeasuredRoad, Progress
+from logger.lab.selection.stepwise import MeasuredRoad, Progress, is_outside_data
 from logger.runs import Past, Run
 from logger.simulation.virtual_drive import SEARCH_HZ
 from logger.vehicle.effect import Chosen, Effect, Misalignment, Sought, chosen
@@ -86,37 +87,37 @@ class UnknownNumbers(MeasuredRoad):
 
     def screened(self, base: Baseline, effects: Sequence[Effect], seen: Misalignment, near: Chosen | None,
                  pool: ThreadPoolExecutor, progress: Progress) -> list[Screened]:
-        """Effects screened on the model, and by squares in cars that are drawn."""
+        """Effects screened on the model, and by squares in cars that are drawn, one after the other: a car ends early
+        where it cannot reach the best so far at its pace, and once an effect has shown the numbers of the car, the
+        others are tried with these."""
         local = super().screened(base, effects, seen, near, pool, progress)
         # Were numbers far off, the car's resonances would be, and leave more than so little of what was measured.
         if base.explanation == 0 or base.hold_out.error < UNEXPLAINED:
             return local
         by_squares = self._by_squares(base.posterior)
         anchor = self._anchor(by_squares, base.state, 1)
-        without = by_squares.deviance(anchor)
-
-        def begun(one: Screened) -> Screened:
-            if one.effect.sought is Sought.NEVER:  # drafted by the motions of the records, as it begins
-                return one
-            drawn = self._cars(by_squares, one.effect, anchor, one.trials)
-            if not (ends := _improved(by_squares, [some[0] for some in drawn if some], 4)):
-                return one
-            return Started(one.effect, one.trials, [one for some in drawn for one in some[1:]], ends,
-                           without - ends[0][0])
-
-        def farther(one: Screened) -> Screened:
-            if not isinstance(one, Started):
-                return one
-            ends = _improved(by_squares, one.ends, 4)
-            return replace(one, ends=ends, gain_by_squares=without - ends[0][0])
-
-        found = sorted(pool.map(begun, local), key=_by_gain)
-        # Sequential halving: Z. Karnin, T. Koren and O. Somekh, ICML 2013.
-        for best in (-(-len(found) // 2), -(-len(found) // 4)):
-            found[:best] = pool.map(farther, found[:best])
-            found.sort(key=_by_gain)
+        least = without = by_squares.deviance(anchor)
+        numbers: Array | None = None
+        found: list[Screened] = []
+        for one in local:
+            drafted = one.effect.sought is Sought.NEVER  # by the motions of the records, as it begins
+            drawn = [] if drafted else self._cars(by_squares, one.effect, anchor, one.trials, numbers)
+            begun = [some[0][1] for some in drawn]
+            ends = sorted(pool.map(partial(by_squares.improved, to_reach=least), begun), key=_by_deviance)
+            found.append(Started(one.effect, one.trials, [each for some in drawn for each in some[1:]], ends,
+                                 without - ends[0][0]) if ends else one)
+            if ends and ends[0][0] < least and not is_outside_data(base.posterior, ends[0][1].effects[-1]):
+                least, best = ends[0]
+                numbers = best.logs if self._shows_the_car(by_squares, anchor, best) else None
         self._keep(*(one.ends for one in found if isinstance(one, Started)))
-        return found
+        return sorted(found, key=lambda one: -one.gain)
+
+    @staticmethod
+    def _shows_the_car(by_squares: BySquares, without: State, there: State) -> bool:
+        """Whether a model leaves so little of what was measured that the numbers of its car are not far off, and so
+        little of what the one without its last effect leaves that others can only imitate it."""
+        left, before = (by_squares.posterior.error(one) for one in (there, without))
+        return left < UNEXPLAINED and left**2 < IMITATION * before**2
 
     def stripped(self, now: Baseline, name: str) -> None:  # type: ignore[override]
         """It is the fitted one."""
@@ -128,7 +129,7 @@ class UnknownNumbers(MeasuredRoad):
             return fit_roughly(score, base, one, least)
         by_squares = self._by_squares(base.posterior)
         reached = {state.effects[-1].is_plain: deviance for deviance, state in reversed(one.ends)}
-        others = (by_squares.improved(state, 12, reached.get(state.effects[-1].is_plain, np.inf))
+        others = (by_squares.improved(state, to_reach=reached.get(state.effects[-1].is_plain, np.inf))
                   for _, state in one.others)
         ends = sorted([*one.ends, *others], key=_by_deviance)
         self._keep(ends)
@@ -171,7 +172,7 @@ class UnknownNumbers(MeasuredRoad):
         here = by_squares.at(near.effects, near.logs, near)
         begun = [] if here is None else [by_squares.improved(here[1], 6)]
         drawn = self._cars(by_squares, None, near)
-        begun += _improved(by_squares, [one for some in drawn for one in some[:count]], 12)
+        begun += [by_squares.improved(state) for some in drawn for _, state in some[:count]]
         self._keep(begun)
         return min(begun, key=_by_deviance)[1]
 
@@ -179,20 +180,25 @@ class UnknownNumbers(MeasuredRoad):
         """Ends of starts, each of one model, where later rounds begin."""
         self._ended |= {frozenset(one.effect.name for one in some[0][1].effects): some for some in ends}
 
-    def _cars(self, by_squares: BySquares, effect: Effect | None, near: State, trials: Sequence[Trial] = ()
-              ) -> list[list[_Drawn]]:
+    def _cars(self, by_squares: BySquares, effect: Effect | None, near: State, trials: Sequence[Trial] = (),
+              known: Array | None = None) -> list[list[_Drawn]]:
         """The best cars of each kind with the effects of a state and one more, the best first. Cars are drawn once for
-        an effect; later rounds begin where these ended, and at its trials on the model."""
-        cars = self._known(effect, near, trials) or self._draw(effect, by_squares.posterior, near)
+        an effect, unless the car's numbers are ``known``; later rounds begin where these ended, and at its trials on
+        the model."""
+        cars = self._known(effect, near, trials, known) or self._draw(effect, by_squares.posterior, near)
         ranked = [[(by_squares.rank(effects, logs, near), effects, logs) for effects, logs in some] for some in cars]
-        return [[state for _, having, there in sorted(some, key=_by_deviance)[: self.starts]
+        best = [[state for _, having, there in sorted(some, key=_by_deviance)[: self.starts]
                  if (state := by_squares.at(having, there, near)) is not None] for some in ranked]
+        return [some for some in best if some]
 
-    def _known(self, effect: Effect | None, near: State, trials: Sequence[Trial]) -> list[list[_Car]]:
-        """Cars where starts of the same model ended, or of another with the effect, and those at its trials: with the
-        effect in its plain form, and with its refinements. Empty: there are none."""
+    def _known(self, effect: Effect | None, near: State, trials: Sequence[Trial], known: Array | None
+               ) -> list[list[_Car]]:
+        """Cars where starts of the same model ended, or of another with the effect, those with numbers that are known
+        and the effect at its usual sizes, and those at its trials: with the effect in its plain form, and with its
+        refinements. Empty: there are none."""
         names = [*(one.effect.name for one in near.effects), *([effect.name] if effect else [])]
-        cars: list[_Car] = []
+        cars: list[_Car] = [([*near.effects, chosen(effect, values)], known) for values in effect.trials()
+                            ] if effect and known is not None else []
         for having, ends in list(self._ended.items()):
             for _, end in ends if having == {*names} or (effect and effect.name in having) else ():
                 by_name = {one.effect.name: one for one in (*near.effects, *end.effects)}
@@ -258,15 +264,6 @@ def fitted_from_starts(posterior: Posterior, present: Sequence[Chosen]) -> Linea
     found = UnknownNumbers().fitted(posterior.simulated(SEARCH_HZ), present).linear
     state = found.state
     return fit_model(posterior, posterior.state_at(state.effects, state.logs, state.record, state.size), found.numbers)
-
-
-def _improved(by_squares: BySquares, drawn: Sequence[_Drawn], rounds: int) -> list[_Drawn]:
-    """Cars improved by squares, the best first; twelve rounds lead to the end."""
-    return sorted((by_squares.improved(state, rounds) for _, state in drawn), key=_by_deviance)
-
-
-def _by_gain(one: Screened) -> float:
-    return -one.gain
 
 
 def _by_deviance(one: tuple[float, *tuple[Any, ...]]) -> float:

@@ -59,3 +59,20 @@ def test_a_start_ends_early_where_it_cannot_reach_another_at_its_pace() -> None:
     assert end < once < begun
     assert by_squares.improved(start, 12, end)[0] == end
     assert by_squares.improved(start, 12, once - 20 * (begun - once))[0] == once
+
+
+@pytest.mark.slow
+def test_where_an_effect_leaves_next_to_nothing_others_are_tried_in_its_car(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rig, ranked, rank = Rig(wheel_kg=1.0, damper=7.5, tire=6000.0, cubic=4e6), list[str](), BySquares.rank
+    monkeypatch.setattr(BySquares, "rank", lambda *given: ranked.append(
+        given[1][-1].effect.name if given[1] else "") or rank(*given))
+    write_run(tmp_path / "run", shaken(rig, swept_table(12.0, 1.0, 15.0, 0.006)), 0.02, 3)
+    vehicle = tmp_path / "rig.yaml"
+    vehicle.write_text(FILE.format(*(f"{one} +- 100%" for one in (
+        rig.wheel_kg, rig.spring, rig.damper, rig.tire))), "utf-8")
+    found = ridelog.diagnose(vehicle, tmp_path / "run", candidates=CANDIDATES)
+    assert found.verdict == ("progressive_spring",)
+    draws = UnknownNumbers().draws
+    assert ranked.count("progressive_spring") >= draws
+    assert sum(ranked.count(name) for name in CANDIDATES[1:]) < draws
