@@ -320,9 +320,7 @@ class BufferedDecoder(ABC):
     @property
     def counts(self) -> dict[str, int]:
         """What came in so far, and what is missing in it."""
-        clock = self._samples.clock
-        return {"samples": self._samples.good, "overruns": self._overruns, "lost": clock.lost,
-                "resyncs": clock.resyncs, "undated": self._samples.undated}
+        return {**self._samples.counts, "overruns": self._overruns}
 
     def feed(self, t_us: int, data: bytes) -> None:
         """Take the entries of one look at ``t_us``. BadReply (and nothing taken) for bytes that are none."""

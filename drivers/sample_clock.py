@@ -613,6 +613,11 @@ class DatedSamples:
         keep = good[:n] & dated
         return AccelerationBlock(t_us[keep], accel_mps2[:n][keep], clipped[:n][keep], self.clock.rate_hz)
 
+    @property
+    def counts(self) -> dict[str, int]:
+        """What came in so far, and what is missing in it."""
+        return {"samples": self.good, "lost": self.clock.lost, "resyncs": self.clock.resyncs, "undated": self.undated}
+
     def doubt(self, check: str) -> str:
         """What is wrong with the samples that come, and what to ``check``; empty: nothing."""
         if self.clock.refused_hz is not None:
@@ -622,11 +627,6 @@ class DatedSamples:
             return f"too many samples are lost to locate each: ridelog makes no rows from the others. {check}"
         if self.clock.lost_share >= WORTH_TELLING:
             return f"{100 * self.clock.lost_share:.1f} of 100 samples are lost, and their rows flagged gap. {check}"
-        return self.burst_doubt
-
-    @property
-    def burst_doubt(self) -> str:
-        """That samples come too late to make rows, and what to do; empty: they do not."""
         if self.burst_s < LONGEST_BURSTS_S:
             return ""
         return (f"its samples come {self.burst_s:.1g} s at a time, because something on the way buffers them: too "

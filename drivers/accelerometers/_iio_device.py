@@ -250,10 +250,6 @@ class IioDevice:
         """Where the scans are read."""
         return self._root / "dev" / self.path.name
 
-    def raw_files(self) -> list[Path]:
-        """Where single values of x, y, z are read."""
-        return [self.path / f"in_accel_{axis}_raw" for axis in AXES]
-
     def close(self) -> None:
         """Switch the buffer off if it was switched on here. Never raises."""
         if self._is_ours:

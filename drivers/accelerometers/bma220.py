@@ -66,16 +66,12 @@ SOFT_RESET = ToggleRegister("soft reset", 0x32)
 WRITABLE = (AXES, FILTER, RANGE, WATCHDOG)
 
 
-def lying_flat() -> bytes:
-    """One sample of a chip at rest with Z up, at the range of +-2 g."""
-    return bytes((0, 0, 16 << 2))
-
-
 class Bma220Chip:
     """One chip. All attributes may be changed at any time, to put it into any state.
 
     data_address, sample_bytes    a read of so many bytes from there on takes a sample
-    sample       gives the three data bytes; called once per read that begins at the data registers
+    sample       gives the three data bytes, as they are at rest with Z up at +-2 g unless it is given; called once per
+                 read that begins at the data registers
     suspended    in suspend: reads work, writes are ignored
     in_reset     held in soft reset: the same, and the registers stand at their defaults
     registers    what the writable registers hold, by address
@@ -85,7 +81,7 @@ class Bma220Chip:
     data_address = DATA_ADDRESS
     sample_bytes = SAMPLE_BYTES
 
-    def __init__(self, sample: Callable[[], bytes] = lying_flat) -> None:
+    def __init__(self, sample: Callable[[], bytes] = lambda: bytes((0, 0, 16 << 2))) -> None:
         self.sample = sample
         self.stuck: dict[int, int] = {}
         self.registers: dict[int, int] = {}

@@ -25,6 +25,7 @@ import numpy as np
 
 from drivers.accelerometers._iio_device import (
     AUTO,
+    AXES,
     POLLED_HZ,
     IioDevice,
     Integers,
@@ -116,7 +117,8 @@ class IioSource:
             self._scans.open()
             return
         try:
-            for path in self._device.raw_files():
+            for axis in AXES:
+                path = self._device.path / f"in_accel_{axis}_raw"
                 self._values.append(os.open(path, os.O_RDONLY | os.O_CLOEXEC))
         except OSError as error:
             raise NotPresent(f"{self._device.path.name}: {error.strerror}") from error
@@ -224,12 +226,8 @@ class IioDecoder:
 
     @property
     def counts(self) -> dict[str, int]:
-        found = dict(self._before)
-        if self._dated is not None:
-            clock = self._dated.clock
-            now = {"samples": self._dated.good, "lost": clock.lost, "resyncs": clock.resyncs,
-                   "undated": self._dated.undated}
-            found = {key: count + now[key] for key, count in found.items()}
+        now = self._dated.counts if self._dated is not None else {}
+        found = {key: count + now.get(key, 0) for key, count in self._before.items()}
         return {**found, "samples": found["samples"] + self._values, "undescribed": self._undescribed}
 
     def feed(self, t_us: int, data: bytes) -> None:

@@ -34,7 +34,7 @@ from drivers.readings import (
     Special,
     Text,
 )
-from drivers.sample_clock import WORTH_TELLING, DatedSamples, UndatedSamples
+from drivers.sample_clock import DatedSamples, UndatedSamples
 from drivers.wire_contents import SENSOR, RecentBytes
 from drivers.wire_profiles import (
     FrameLayout,
@@ -142,7 +142,6 @@ class PascoDecoder:
             raise SettingsError(f"profile {profile.name}: expected no calibration, its values are accelerations")
         self._profile = profile
         self._samples = DatedSamples(profile.rate_hz, profile.clock_tolerance)
-        self._clock = self._samples.clock
         self._arrivals = Arrivals()
         self._chunks: list[bytes] = []
         self._recent = RecentBytes()
@@ -152,19 +151,9 @@ class PascoDecoder:
     @property
     def doubt(self) -> str:
         """What is wrong with the samples that come, and what to do; empty: nothing."""
-        usual = f"{self._profile.rate_hz:g}"
-        if self._clock.refused_hz is not None:
-            return (f"it sends about {self._clock.refused_hz:.0f} samples a second, too few or unevenly, and the "
-                    f"profile {self._profile.name} expects {usual}: ridelog makes no rows from them. Set the device to "
-                    f"{usual} a second, or find what loses them (lost lines: baud rate at both ends, cable, a busy "
-                    "bridge)")
-        if self._clock.too_many_lost:
-            return ("too many samples are lost on the line to locate each: ridelog makes no rows from the others. "
-                    "Check the baud rate at both ends, the cable, and whether the bridge keeps up")
-        if self._clock.lost_share >= WORTH_TELLING:
-            return (f"{100 * self._clock.lost_share:.1f} of 100 samples are lost on the line, and their rows flagged "
-                    "gap: check the baud rate at both ends, the cable, and whether the bridge keeps up")
-        return self._samples.burst_doubt
+        return self._samples.doubt(f"Check the rate of the device (the profile {self._profile.name} says "
+                                   f"{self._profile.rate_hz:g} a second), the baud rate at both ends, the cable, and "
+                                   "whether the bridge keeps up")
 
     @property
     def note(self) -> str:
@@ -188,9 +177,9 @@ class PascoDecoder:
         undated         samples left out because they came at a rate that cannot be used, or too many were lost among
                         them
         """
-        samples, clock = self._samples, self._clock
-        return {"frames": samples.good, "bad_frames": samples.bad, "dropped_bytes": self._reader.framer.dropped_bytes,
-                "resyncs": clock.resyncs, "lost": clock.lost, "undated": samples.undated}
+        counts = self._samples.counts
+        return {"frames": counts.pop("samples"), "bad_frames": self._samples.bad,
+                "dropped_bytes": self._reader.framer.dropped_bytes, **counts}
 
     def feed(self, t_us: int, data: bytes) -> None:
         """Take the bytes that arrived at ``t_us`` [us, monotonic]."""

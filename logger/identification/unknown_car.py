@@ -23,12 +23,7 @@ from functools import cached_property, lru_cache, partial
 import numpy as np
 
 from logger.arrays import Array, Bools
-from logger.estimation.car_response import (
-    HIGHEST_HZ,
-    WAVE_NUMBER_STEPS_CPM,
-    WAVE_NUMBERS_CPM,
-    golden_car_slope,
-)
+from logger.estimation.car_response import HIGHEST_HZ, WAVE_NUMBER_STEPS_CPM, WAVE_NUMBERS_CPM, golden_car_slope
 from logger.estimation.drive_spectra import INDEPENDENT, DriveSpectra, counts, expected, grid_hz, middles_hz
 from logger.estimation.road_spectrum import PIVOT_CPM
 from logger.vehicle.linear_car import LinearCar, frequency_response

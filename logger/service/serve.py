@@ -24,13 +24,7 @@ from logger.errors import BadInput
 from logger.service import wiring
 from logger.service.config import Config
 from logger.service.event_core import EventCore
-from logger.service.learning import (
-    NoiseLearning,
-    ReceiverLearning,
-    delay_at_start,
-    noise_at_start,
-    read_delay,
-)
+from logger.service.learning import NoiseLearning, ReceiverLearning, delay_at_start, noise_at_start, read_delay
 from logger.service.main_loop import Listener, MainLoop, monotonic_us
 from logger.service.pipeline import Pipeline
 from logger.service.signal_chain import Axis

@@ -208,9 +208,7 @@ def _asked(structure: Structure, laws: Sequence[CornerLaws], way: Way, begins: A
             np.zeros(FELT + MOST_MEMORY), np.zeros(ANSWERS), places, clock)
 
 
-def _tabulated(
-    structure: Structure, laws: Sequence[CornerLaws], step_s: float,
-) -> tuple[Array, Array, Array]:
+def _tabulated(structure: Structure, laws: Sequence[CornerLaws], step_s: float) -> tuple[Array, Array, Array]:
     """What the laws add to the linear springs, dampers and tires, as the loop reads it: tables of one and of two
     variables, and numbers."""
     from logger.vehicle.stepping_loop import RATE_MPS, TRAVEL_M

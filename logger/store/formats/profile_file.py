@@ -46,14 +46,7 @@ from logger.errors import BadInput
 from logger.files import file_in, read_bounded
 from logger.profiles.excitation import AppliedForce, Excitation
 from logger.roads.iri import UNITS_M, unit_complaint
-from logger.store.formats.csv_table import (
-    LINE_BYTES,
-    parse_columns,
-    place,
-    refuse_long_lines,
-    shown,
-    taken,
-)
+from logger.store.formats.csv_table import LINE_BYTES, parse_columns, place, refuse_long_lines, shown, taken
 from logger.store.formats.record_file import MAX_BYTES, TIME, even_rate_hz, laid_evenly
 from logger.units import FOOT_M
 
