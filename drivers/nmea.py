@@ -126,7 +126,7 @@ MINUTE_US = 60 * US_PER_S
 DAY_US = 86_400 * US_PER_S
 ROLLOVER_DAYS = 1024 * 7
 ROLLOVERS_MAX = 8
-GPS_EPOCH_DAY = datetime.date(1980, 1, 6).toordinal() - EPOCH_ORDINAL
+GPS_BEGAN = datetime.date(1980, 1, 6)
 DAYS_OF_WEEK = 7  # A date in the first week of a count is that of a receiver that has not heard yet which week it is
 
 
@@ -268,7 +268,7 @@ class NmeaDecoder:
         turns = -(-(self._earliest_utc_us - self._too_early_us) // (ROLLOVER_DAYS * DAY_US))
         rollovers = self._added_us // (ROLLOVER_DAYS * DAY_US) + turns
         wrong = f"its date is {_words_of(day)}, before gps.earliest_date in the settings, so no row has a date"
-        counted_days = day - self._added_us // DAY_US - GPS_EPOCH_DAY
+        counted_days = day - self._added_us // DAY_US - (GPS_BEGAN.toordinal() - EPOCH_ORDINAL)
         if rollovers > ROLLOVERS_MAX or counted_days < 0 or counted_days % ROLLOVER_DAYS < DAYS_OF_WEEK:
             return f"{wrong}: give its antenna a free view of the sky, or replace it"
         return (f"{wrong}. If the date is right, change earliest_date. If today is about "

@@ -18,6 +18,8 @@ from logger.errors import BadInput
 
 MOST_SAMPLES = 10_000_000
 """28 hours at 100 Hz, 500 km of road at 0.05 m: 80 MB a column, so that a desk command stays below half a gigabyte."""
+MOVING_MPS = 3.0
+"""A car that is faster drives, whatever its receiver errs by."""
 FASTEST_HZ = 1e6
 """No accelerometer is read faster."""
 LONGEST_HOLE_S = 0.5

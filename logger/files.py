@@ -28,6 +28,9 @@ from logger.errors import BadInput
 
 DISK = FileSystem()  # Where all of it goes
 BESIDE = ".ridelog-"  # How files begin that are being written; one that a killed process has left may be removed
+SETTINGS_BYTES = 256 * 1024  # Most of a file that a person writes
+STATE_BYTES = 4 * SETTINGS_BYTES  # Most of one that a program keeps, such as settings and vehicle beside a log
+MAP_BYTES = 256 << 20  # Most of a file that is unfolded whole in memory, as JSON is
 _BLOCK_BYTES = 1 << 20  # of the size of a large file's extents; a call costs nothing beside it
 _AGREED: ContextVar[_Agreed | None] = ContextVar("_AGREED", default=None)
 _WRITTEN: ContextVar[list[Path] | None] = ContextVar("_WRITTEN", default=None)

@@ -19,9 +19,7 @@ from typing import Any
 
 from drivers.catalogue import CatalogueError, offers
 from logger.errors import BadInput, RidelogError
-from logger.files import read_bounded
-
-_MAX_BYTES = 256 * 1024
+from logger.files import SETTINGS_BYTES, read_bounded
 
 
 def catalogue(package: str, offer: str) -> dict[str, Any]:
@@ -41,7 +39,7 @@ def offered_by(path: Path, offer: str) -> Any:
     Raises BadInput that names the file, and the line where there is one, for a file that cannot be read, is not Python,
     raises, or does not offer it.
     """
-    source = read_bounded(path, _MAX_BYTES)
+    source = read_bounded(path, SETTINGS_BYTES)
     module = ModuleType(f"ridelog_own_{path.stem}")
     module.__file__ = str(path)
     sys.modules[module.__name__] = module  # dataclasses and pickles look for it there

@@ -263,7 +263,10 @@ class _Pasco(SerialAccelerometer[PascoConfig]):
 
     def decoder(self, settings: PascoConfig, upright_axis: int) -> PascoDecoder:
         """By the profile; frames without start bytes are distinguished by the axis that feels gravity."""
-        return PascoDecoder(_mounted(load_profile(settings.profile), upright_axis), settings.calibration)
+        profile = load_profile(settings.profile)
+        if isinstance(profile.layout, FrameLayout) and profile.layout.upright_axis is not None:
+            profile = replace(profile, layout=replace(profile.layout, upright_axis=upright_axis))
+        return PascoDecoder(profile, settings.calibration)
 
     def readings(self, settings: PascoConfig) -> ReadingQuality:
         """Fine steps, at a rate that the decoder finds out."""
@@ -290,13 +293,6 @@ class _Pasco(SerialAccelerometer[PascoConfig]):
             raise SettingsError("recorded with a calibration of its own; expected its settings, --config FILE")
         return replace(settings, profile=said.name("profile", settings.profile, shipped_profiles(),
                                                    "the settings of the recording, --config FILE, or "))
-
-
-def _mounted(profile: WireProfile, upright_axis: int) -> WireProfile:
-    """The profile for a sensor that feels gravity along this axis."""
-    if not isinstance(profile.layout, FrameLayout) or profile.layout.upright_axis is None:
-        return profile
-    return replace(profile, layout=replace(profile.layout, upright_axis=upright_axis))
 
 
 ACCELEROMETER = _Pasco()

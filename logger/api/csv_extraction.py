@@ -29,7 +29,7 @@ from logger.api.extraction import (
     write_runs,
 )
 from logger.arrays import Array
-from logger.bounds import ACCELERATION, LONGEST_HOLE_S, SPEED, samples_between
+from logger.bounds import ACCELERATION, LONGEST_HOLE_S, MOVING_MPS, SPEED, samples_between
 from logger.dsp.repeated_samples import find_holds, resolution, still_until_s
 from logger.errors import BadInput
 from logger.estimation.drive_alignment import DriveAlignment
@@ -53,7 +53,6 @@ from logger.printable import counted, word
 from logger.runs import RecordFacts
 from logger.service import wiring
 from logger.service.config import Config
-from logger.service.doubted_spans import MOVING_MPS
 from logger.service.drive_readings import GridReadings
 from logger.service.learning import delay_at_start
 from logger.shipped import vehicle_path

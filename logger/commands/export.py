@@ -9,13 +9,12 @@ from pathlib import Path
 from typing import Annotated
 
 from logger.errors import BadInput, RidelogError
-from logger.files import read_bounded
+from logger.files import SETTINGS_BYTES, read_bounded
 from logger.printable import counted, printable
 from logger.question import Checked, Hidden, Option, Question, Verb
 from logger.service.config import Config, find_config, load_config, load_pairing
 from logger.store.export import sticks
 from logger.store.export.export import ExportResult, Progress, export
-from logger.store.formats.yaml_nodes import MAX_BYTES
 from logger.store.log.atomic_file import is_taken
 
 _PULL = "it may be pulled"
@@ -108,7 +107,7 @@ def _may_be_paired(settings: Path, logs: Path) -> bool:
     if not is_taken(settings):
         return False
     try:
-        text = read_bounded(settings, MAX_BYTES)
+        text = read_bounded(settings, SETTINGS_BYTES)
     except BadInput:
         return True
     # No YAML, perhaps not even UTF-8: all that can be looked for is a mode, outside of comments.

@@ -157,9 +157,6 @@ def _order(rows: Array, impulse: Array) -> tuple[float, list[int]]:
 
 FRACTION_BITS = 30
 UNIT = 1 << FRACTION_BITS
-HALF = UNIT // 2
-LARGEST_COEFFICIENT = (1 << 31) - 1
-LARGEST_SUM = (1 << 63) - 1
 DATA_BITS = (16, 32)
 COARSEST_COEFFICIENTS_DB = -90.0
 
@@ -263,21 +260,22 @@ def _fitted(row: Array, paths: list[_Path], data_bits: int) -> tuple[float, Fixe
     a = _denominator(row[4:])
     recursion = sum(map(abs, a))
     rounding = _rounding(a, len(paths[0][1]))
-    carry = (recursion + 1) * HALF // UNIT + HALF + 1
+    carry = (recursion + 1) // 2 + UNIT // 2 + 1
     largest_b, total_b = np.abs(row[:3]).max() * UNIT, np.abs(row[:3]).sum() * UNIT
     reach = _bound([(largest, _response(row[:3] * UNIT, a, response)) for largest, response in paths])
     room = largest_word(data_bits) - _bound(rounding)
-    sum_room = LARGEST_SUM - carry - _bound(rounding) * recursion
+    sum_room = largest_word(64) - carry - _bound(rounding) * recursion
     gain = _SPARE * min(
         room / reach,
         sum_room / (_bound(paths) * total_b + reach * recursion),
-        LARGEST_COEFFICIENT / largest_b,
+        largest_word(32) / largest_b,
     )
     b = _numerator(row[:3] * gain)
     reached = [(largest, _response(b, a, response)) for largest, response in paths] + rounding
     largest_output = math.ceil(_bound(reached))
     largest_sum = math.ceil(_bound(paths)) * sum(map(abs, b)) + largest_output * recursion + carry
-    if max(map(abs, b)) > LARGEST_COEFFICIENT or largest_output > largest_word(data_bits) or largest_sum > LARGEST_SUM:
+    too_large = largest_output > largest_word(data_bits) or largest_sum > largest_word(64)
+    if too_large or max(map(abs, b)) > largest_word(32):
         raise ValueError(f"expected a section that a scale fits, not b, a1, a2 = {b}, {a} / 2^30")
     return gain, FixedSection(b, a, largest_output, largest_sum), reached
 
@@ -293,7 +291,7 @@ def _numerator(b: Array) -> tuple[int, int, int]:
 def _denominator(a: Array) -> tuple[int, int]:
     """a1, a2 as integers, still stable (the triangle |a1| < 1 + a2, a2 < 1)."""
     a1, a2 = (round(value * UNIT) for value in a.tolist())
-    if not (a2 < UNIT and abs(a1) < UNIT + a2 and abs(a1) <= LARGEST_COEFFICIENT):
+    if not (a2 < UNIT and abs(a1) < UNIT + a2 and abs(a1) <= largest_word(32)):
         raise ValueError(f"expected a section that is stable with 32-bit coefficients, not a1, a2 = {a.tolist()}")
     return a1, a2
 
@@ -392,10 +390,10 @@ class _Section:
         a1, a2 = self._a
         x1, x2 = self._inputs
         w1, w2 = self._words
-        outputs = []
+        half, outputs = UNIT // 2, []
         for x in inputs:
-            w = b0 * x + b1 * x1 + b2 * x2 + ((HALF - a1 * w1 - a2 * w2) >> FRACTION_BITS)
+            w = b0 * x + b1 * x1 + b2 * x2 + ((half - a1 * w1 - a2 * w2) >> FRACTION_BITS)
             x1, x2, w1, w2 = x, x1, w, w1
-            outputs.append((w + HALF) >> FRACTION_BITS)
+            outputs.append((w + half) >> FRACTION_BITS)
         self._inputs, self._words = (x1, x2), (w1, w2)
         return outputs

@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 from enum import Enum
 from functools import cache
-from itertools import pairwise
+from itertools import groupby, pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -60,7 +60,7 @@ def cut(line: Line) -> Geometry:
             parts[-1].append((edge, lat))
             parts.append([(-edge, lat)])
         parts[-1].append((lon1, lat1))
-    lines = [tuple(_without_repeats(part)) for part in parts]
+    lines = [tuple(place for place, _ in groupby(part)) for part in parts]  # those of a car that stands are all one
     return tuple(part for part in lines if len(part) > 1) or (lines[0],)
 
 
@@ -74,11 +74,6 @@ def chained(geometries: Sequence[Geometry]) -> Geometry:
             lines.append(list(line))
     found = tuple(map(tuple, lines))
     return tuple(line for line in found if len(line) > 1) or found[:1]
-
-
-def _without_repeats(places: Sequence[Place]) -> Iterator[Place]:
-    """Those of a car that stands are all the same."""
-    return (place for index, place in enumerate(places) if not index or place != places[index - 1])
 
 
 def _wrapped(lon_deg: float) -> float:

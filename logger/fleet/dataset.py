@@ -28,7 +28,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.errors import BadInput
-from logger.files import BESIDE, DISK, make_folder, naming, read_bounded, replace_bytes
+from logger.files import BESIDE, DISK, MAP_BYTES, make_folder, naming, read_bounded, replace_bytes
 from logger.fleet.road_map import region_of
 from logger.store.log.atomic_file import FolderLock
 from logger.units import DAY_US
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
 
 EXTRA = "expected the 'fleet' extra: pip install '.[fleet]' in the folder of ridelog's source ({})"
 _MANIFEST = "manifest.json"
-_MAX_BYTES = 512 << 20
 _FORMAT = 1
 _EPOCH_MONTH = 1970 * 12
 _ROWS_PATH = re.compile(r"month=[0-9]{4}-[0-9]{2}/cell=-?[0-9]{1,20}/[0-9]{6,12}-[0-9]{1,9}\.parquet")
@@ -197,7 +196,7 @@ class Dataset:
         if not path.exists():
             return DatasetManifest()
         try:
-            content = json.loads(read_bounded(path, _MAX_BYTES))
+            content = json.loads(read_bounded(path, MAP_BYTES))
             if content["ridelog_fleet"] != _FORMAT:
                 raise ValueError
             commits = tuple(Commit(one["name"], _inside(one["ledger"], _LEDGER_PATH), int(one["rows"]), tuple(

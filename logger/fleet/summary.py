@@ -210,7 +210,7 @@ _ZERO_US = 1_577_836_800_000_000  # 2020-01-01: years count from here, so that t
 
 
 @dataclass(frozen=True, eq=False)
-class RoadTable:
+class RoadTable(RoadFigures):
     """Figures of n segments, sections, cells or routes; NaN: not known.
 
     key                       of a segment or a section; for others the number of the cell or route
@@ -218,7 +218,6 @@ class RoadTable:
     length_m                  of road with figures
     cars, passes              of a group of segments the least and the mean number on its segments
     mean_years                mean time of the passes, from 2020-01-01 on
-    iri_m_per_km, ...         as in ``road_figures``
     a_w_mps2, speed_mps       r.m.s. over the passes, and mean
     last_us                   of the last pass [us since 1970]
     worse                     the change is significant and upwards
@@ -234,11 +233,6 @@ class RoadTable:
     cars: Keys
     passes: Array
     mean_years: Array
-    iri_m_per_km: Array
-    iri_std_m_per_km: Array
-    trend_m_per_km_per_year: Array
-    trend_std_m_per_km_per_year: Array
-    p_value: Array
     a_w_mps2: Array
     speed_mps: Array
     last_us: Keys
@@ -430,7 +424,5 @@ def _table(by: str, key: Keys, lat_deg: Array, lon_deg: Array, heading_deg: Arra
     hard = a_w_mps2 >= uncomfortable_mps2
     words = np.array(["|".join(word for word, holds in zip(("rough", "worse", "uncomfortable"), three, strict=True)
                                if holds) for three in zip(rough, worse, hard, strict=True)], dtype=np.str_)
-    return RoadTable(by, key, lat_deg, lon_deg, heading_deg, length_m, cars.astype(np.int64), passes,
-                     mean_years, figures.iri_m_per_km, figures.iri_std_m_per_km, figures.trend_m_per_km_per_year,
-                     figures.trend_std_m_per_km_per_year, figures.p_value, a_w_mps2, speed_mps,
-                     last_us.astype(np.int64), worse, words)
+    return RoadTable(*vars(figures).values(), by, key, lat_deg, lon_deg, heading_deg, length_m, cars.astype(np.int64),
+                     passes, mean_years, a_w_mps2, speed_mps, last_us.astype(np.int64), worse, words)

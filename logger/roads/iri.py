@@ -359,7 +359,7 @@ UNITS_M = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3, "in": FOOT_M / 12, "ft":
 DOUBTFUL_M_PER_KM = 100.0
 """No road that a car can drive on is as rough, and no limit that is looked for is half as high."""
 ROUGHEST_M_PER_KM = iri_from_gd_n0(2 * CLASS_GD_N0_CM3["H"])  # Upper limit of class H: twice its geometric mean
-HIGHEST_LIMIT_M_PER_KM = DOUBTFUL_M_PER_KM / 2
+HIGHEST_LIMIT_M_PER_KM = 0.5 * DOUBTFUL_M_PER_KM
 _FINEST_M = 1e-3  # No profiler samples more densely; 0.3 m apart are 0.0003 km
 
 

@@ -18,7 +18,7 @@ from typing import Any, TypeVar
 from drivers.accelerometers import DEFAULT, accelerometers
 from drivers.accelerometers.accelerometer import Accelerometer
 from drivers.errors import SettingsError
-from drivers.nmea import ROLLOVERS_MAX
+from drivers.nmea import GPS_BEGAN, ROLLOVERS_MAX
 from drivers.readings import BAUDS, Decimal, Flag, Kind, OneOf, OrNone, Special, Text, Whole
 from logger.errors import BadInput
 from logger.shipped import shipped, vehicle_file, vehicle_path
@@ -33,7 +33,6 @@ AUTO = "auto"
 LEAST_NOISE_MPS2, MOST_NOISE_MPS2 = 1e-4, 100.0
 WHEELBASES_M, MASSES_KG = (1.5, 6.0), (300.0, 10_000.0)  # from the smallest car with two axles to a lorry
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
-_GPS_BEGAN = date(1980, 1, 6)
 Read = Callable[[Node], Any]
 Section = TypeVar("Section")
 
@@ -142,9 +141,9 @@ def _date(node: Node) -> str:
     try:
         day = date.fromisoformat(text)
     except ValueError:
-        raise node.wrong(f"a date such as {_GPS_BEGAN:%Y-%m-%d}") from None
-    if day < _GPS_BEGAN:
-        raise node.wrong(f"a date from {_GPS_BEGAN:%Y-%m-%d} on, when GPS time began")
+        raise node.wrong(f"a date such as {GPS_BEGAN:%Y-%m-%d}") from None
+    if day < GPS_BEGAN:
+        raise node.wrong(f"a date from {GPS_BEGAN:%Y-%m-%d} on, when GPS time began")
     return day.isoformat()
 
 

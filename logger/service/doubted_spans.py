@@ -12,6 +12,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.readings import AccelerationBlock, Fix
+from logger.bounds import MOVING_MPS
 from logger.dsp.repeated_samples import LEAST_SHARE, are_fresh, find_repeats, fresh_samples
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.geodesy import apart_m
@@ -53,7 +54,6 @@ class DoubtedSpans:
 
 
 FROZEN_S = 30.0
-MOVING_MPS = 3.0
 LONGEST_BETWEEN_FIXES_US = 3 * US_PER_S
 
 

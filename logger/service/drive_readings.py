@@ -22,10 +22,11 @@ import numpy as np
 from drivers.accelerometers.accelerometer import OtherSettings
 from drivers.readings import AccelerationBlock, Fix
 from logger.arrays import Array, Bools
+from logger.bounds import MOVING_MPS
 from logger.dsp.windows import GridSamples, joined
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.records import WindowRecord
-from logger.service.doubted_spans import MOVING_MPS, JudgedDrive
+from logger.service.doubted_spans import JudgedDrive
 from logger.service.signal_chain import SignalChain
 from logger.service.timebase import TimedFix
 from logger.units import US_PER_S

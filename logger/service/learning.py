@@ -24,6 +24,7 @@ from drivers.disk import FileSystem
 from logger.estimation.drive_alignment import DriveAlignment, heading_deg
 from logger.estimation.receiver_delay import CarriedDelay, combined
 from logger.estimation.sensor_noise import NoiseBelief, Sensor
+from logger.files import STATE_BYTES
 from logger.printable import counted
 from logger.service.config import AUTO, LEAST_NOISE_MPS2, MOST_NOISE_MPS2, AccelerometerConfig, GpsConfig
 from logger.service.signal_chain import Axis
@@ -40,7 +41,6 @@ UNKNOWN = CarriedDelay(0.14, 0.07)
 """Before anything was learnt: receivers are late by 0.05 to 0.3 s. Mean and deviation of what is as likely from each
 value to twice that."""
 MOST_DELAY_S = 2.0
-_LARGEST_BYTES = 1000
 _MOST_DRIVES = 10**9
 _OF = "of"
 
@@ -102,7 +102,7 @@ class LearntQuantity(Generic[Known]):
         path = folder / self.file_name
         try:
             with FileSystem().open(path) as file:
-                fields = json.loads(file.read(_LARGEST_BYTES))
+                fields = json.loads(file.read(STATE_BYTES))
             known = self.from_fields(fields)
             return known if known is not None and is_of_this(fields) else None
         except FileNotFoundError:

@@ -141,7 +141,7 @@ class Player:
             if first_us is None:
                 first_us = shown_us = t_us
             if self._rate:
-                _sleep_until(started_s + (t_us - first_us) / US_PER_S / self._rate)
+                time.sleep(max(0.0, started_s + (t_us - first_us) / US_PER_S / self._rate - time.monotonic()))
             self._core.feed(event)
             count += 1
             if t_us - shown_us >= PROGRESS_EVERY_US:
@@ -149,12 +149,6 @@ class Player:
                 self._progress((t_us - first_us) / US_PER_S)
         self._core.finish()
         return Playback(count, (t_us - first_us) / US_PER_S if first_us is not None else 0.0)
-
-
-def _sleep_until(monotonic_s: float) -> None:
-    wait_s = monotonic_s - time.monotonic()
-    if wait_s > 0:
-        time.sleep(wait_s)
 
 
 LOOP_S = 0.5

@@ -19,9 +19,9 @@ from typing import Any, Literal, get_args
 
 from drivers.disk import open_regular
 from logger.errors import BadInput
+from logger.files import STATE_BYTES
 from logger.records import WindowRecord
 
-LARGEST_BYTES = 100_000  # Most that is read of a status file; what is cut there is none
 SensorState = Literal["ok", "absent", "retrying", "silent", "doubtful"]
 ServiceState = Literal["starting", "standing", "recording", "stopping"]
 
@@ -143,7 +143,7 @@ def read_status(path: Path) -> ServiceStatus | None:
     """Read the last snapshot; None where there is none. Raises BadInput for a file that is not one."""
     try:
         with open_regular(path) as file:
-            fields = json.loads(file.read(LARGEST_BYTES))
+            fields = json.loads(file.read(STATE_BYTES))
         window = fields["last_window"]
         if window is not None:
             fields["last_window"] = WindowRecord(**{**window, "flags": tuple(window["flags"])})

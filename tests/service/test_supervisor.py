@@ -10,7 +10,8 @@ from drivers.accelerometers.bma220 import Bma220Chip, Bma220Config, chip_source
 from drivers.dump import Event
 from drivers.errors import DeviceError, NotPresent, Timeout
 from drivers.sources import SerialSource
-from logger.service.supervisor import FAULTS_IN_A_ROW, FAULTY_US, FIRST_WAIT_US, LONGEST_WAIT_US, Supervisor
+from logger.service.supervisor import FAULTS_IN_A_ROW, FAULTY_US, FIRST_WAIT_US, Supervisor
+from logger.store.log.log_writer import LONGEST_WAIT_US
 
 from ..support.recorded_wires import Cue, Fault, RecordedBus, RecordedPort
 

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from itertools import groupby
 from xml.sax.saxutils import escape
 
-from logger.exchange.layer import DECIMALS, Feature, Format, Layer
+from logger.exchange.layer import DECIMALS, Feature, Format, Layer, Place
 
 _SPACE = "urn:x-ridelog:values:1"
 _IN_THE_POINT = {"lat_deg", "lon_deg", "t_utc"}
@@ -30,7 +30,8 @@ def _lines(layer: Layer) -> Iterator[str]:
     yield ('<?xml version="1.0" encoding="UTF-8"?>\n<gpx version="1.1" creator="ridelog" '
            f'xmlns="http://www.topografix.com/GPX/1/1" xmlns:ridelog="{_SPACE}">\n')
     if layer.points:
-        yield from (_waypoint(row, row.middle, layer.names) for row in layer.features if row.middle)
+        yield from (_point("wpt", row, row.middle, layer.names, f"<name>{escape(row.title)}</name>")
+                    for row in layer.features if row.middle)
     for group, rows in () if layer.points else groupby(layer.features, lambda row: row.group):
         yield f"<trk><name>{escape(group)}</name>\n"
         yield from _segments(rows, layer.names)
@@ -44,33 +45,21 @@ def _segments(rows: Iterable[Feature], names: tuple[str, ...]) -> Iterator[str]:
         if is_open and not row.joins:
             yield "</trkseg>\n"
         if row.middle is not None:
-            yield ("" if is_open and row.joins else "<trkseg>\n") + _point(row, row.middle, names)
+            yield ("" if is_open and row.joins else "<trkseg>\n") + _point(
+                "trkpt", row, row.middle, names)
         is_open = row.middle is not None
     if is_open:
         yield "</trkseg>\n"
 
 
-def _waypoint(row: Feature, middle: tuple[float, float], names: tuple[str, ...]) -> str:
+def _point(kind: str, row: Feature, middle: Place, names: tuple[str, ...], name: str = "") -> str:
     lon_deg, lat_deg = middle
-    return (f'<wpt lat="{lat_deg:.{DECIMALS}f}" lon="{lon_deg:.{DECIMALS}f}">{_time(row)}'
-            f"<name>{escape(row.title)}</name>{_extensions(row, names)}</wpt>\n")
-
-
-def _point(row: Feature, middle: tuple[float, float], names: tuple[str, ...]) -> str:
-    lon_deg, lat_deg = middle
-    return (f'<trkpt lat="{lat_deg:.{DECIMALS}f}" lon="{lon_deg:.{DECIMALS}f}">{_time(row)}{_extensions(row, names)}'
-            "</trkpt>\n")
-
-
-def _time(row: Feature) -> str:
-    return "" if row.time_utc is None else f"<time>{row.time_utc}</time>"
-
-
-def _extensions(row: Feature, names: tuple[str, ...]) -> str:
+    time = "" if row.time_utc is None else f"<time>{row.time_utc}</time>"
     values = "".join(f"<ridelog:{name}>{escape(str(value))}</ridelog:{name}>"
                      for name, value in zip(names, row.values, strict=True)
                      if name not in _IN_THE_POINT and value not in (None, ""))
-    return f"<extensions>{values}</extensions>"
+    return (f'<{kind} lat="{lat_deg:.{DECIMALS}f}" lon="{lon_deg:.{DECIMALS}f}">{time}{name}'
+            f"<extensions>{values}</extensions></{kind}>\n")
 
 
 FORMAT = Gpx()

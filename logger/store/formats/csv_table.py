@@ -261,8 +261,8 @@ def refuse_long_lines(data: bytes, file: str, first_line: int = 1) -> None:
 # --- its numbers ---
 
 
-def parse_columns(data: bytes, file: str, choose: Callable[[Names], Names | None], header: str, gaps: bool = False
-                  ) -> tuple[Names, Array, FileOfRows]:
+def parse_columns(data: bytes, file: str, choose: Callable[[Names], Names | None], header: str, gaps: bool = False,
+                  of_samples: bool = False) -> tuple[Names, Array, FileOfRows]:
     """The columns of a table that ``choose`` wants, their numbers, (rows, columns), all finite, at least one row, and
     the file's name for ``place``.
 
@@ -282,6 +282,8 @@ def parse_columns(data: bytes, file: str, choose: Callable[[Names], Names | None
     rows = read_rows(table, [table.names.index(name) for name in wanted], wanted, gaps)
     named = FileOfRows(file)
     named.lines = rows.lines
+    if of_samples and len(rows.values) < 2:
+        raise BadInput(f"{place(named, 1)}: expected at least two samples, found the end of the file")
     return wanted, rows.values, named
 
 

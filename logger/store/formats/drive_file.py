@@ -379,9 +379,7 @@ def read_columns(path: Path | str, timed: bool = False, more: Sequence[str] = ()
     needed = ((TIME, main) if timed else COLUMNS) + tuple(more)
     path = file_in(path, DRIVE)
     names, table, file = parse_columns(read_bounded(path, MAX_BYTES), str(path), partial(_choose, needed=needed),
-                                       _HEADER.format(",".join(needed)))
-    if len(table) < 2:
-        raise BadInput(f"{place(file, 1)}: expected at least two samples, found the end of the file")
+                                       _HEADER.format(",".join(needed)), of_samples=True)
     columns = {name: taken(_QUANTITIES.get(name, bounds.SIGNAL), name, column, file)
                for name, column in zip(names, table.T, strict=True)}
     columns[VERTICAL] = columns.pop(main)
@@ -402,9 +400,7 @@ def read_speeds(path: Path | str) -> tuple[Array, Array]:
     header, path = (TIME, SPEED), file_in(path, DRIVE)
     _, table, file = parse_columns(read_bounded(path, MAX_BYTES), str(path),
                                    lambda names: header if all(names.count(name) == 1 for name in header) else None,
-                                   f"a header with {','.join(header)}, each once")
-    if len(table) < 2:
-        raise BadInput(f"{place(file, 1)}: expected at least two times, found the end of the file")
+                                   f"a header with {','.join(header)}, each once", of_samples=True)
     time_s = taken(replace(bounds.TIME, largest=max_time_s), TIME, table[:, 0], file)
     speed_mps = taken(bounds.SPEED, SPEED, table[:, 1], file)
     check_grows(time_s, file)

@@ -21,10 +21,9 @@ import numpy as np
 
 from logger.arrays import Array
 from logger.errors import BadInput
-from logger.files import read_bounded
+from logger.files import MAP_BYTES, read_bounded
 from logger.printable import printable
 
-_MOST_BYTES = 1 << 28
 _ORDERS = {b"IM": "<", b"MI": ">"}
 _MATRIX, _COMPRESSED = 14, 15  # kinds of elements
 _NUMBERS = {1: "i1", 2: "u1", 3: "i2", 4: "u2", 5: "i4", 6: "u4", 7: "f4", 9: "f8", 12: "i8", 13: "u8"}
@@ -83,7 +82,7 @@ def _names(found: dict[str, _Matrix]) -> str:
 
 
 def _load(path: Path) -> list[_Matrix]:
-    data = read_bounded(path, _MOST_BYTES)
+    data = read_bounded(path, MAP_BYTES)
     if data.startswith(b"MATLAB 7.3"):
         raise BadInput(f"{path}: expected a .mat file up to version 7, found version 7.3: save it with -v7")
     order = _ORDERS.get(data[126:128])
@@ -135,9 +134,9 @@ def _matrices(data: bytes, at: int, end: int, order: str, depth: int = 0) -> Ite
     for kind, begin, stop in _elements(data, at, end, order):
         if kind == _COMPRESSED:
             engine = zlib.decompressobj()
-            inside = engine.decompress(data[begin:stop], _MOST_BYTES)
+            inside = engine.decompress(data[begin:stop], MAP_BYTES)
             if engine.unconsumed_tail:
-                raise ValueError(f"a variable of more than {_MOST_BYTES} bytes")
+                raise ValueError(f"a variable of more than {MAP_BYTES} bytes")
             yield from _matrices(inside, 0, len(inside), order, depth=depth + 1)
         elif kind == _MATRIX and stop > begin:
             yield _matrix(data, begin, stop, order, depth)

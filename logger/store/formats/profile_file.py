@@ -51,7 +51,6 @@ from logger.store.formats.record_file import MAX_BYTES, TIME, even_rate_hz, laid
 from logger.units import FOOT_M
 
 MAX_CHANNELS = 1000
-MAX_HEADER_LINES = 10_000
 MAX_HEADER_BYTES = 1024 * 1024
 MAX_NUMBERS = 50_000_000
 SHORTEST_STEP, LONGEST_STEP = 1e-6, 1e6
@@ -117,11 +116,6 @@ def _metres(unit: str, expected: str, where: str = "") -> float:
     return unit_m
 
 
-def is_erd(data: bytes) -> bool:
-    """Tell an ERD file by its first bytes."""
-    return data.lstrip().startswith(b"ERDFILEV")
-
-
 def parse_erd(data: bytes, path: Path | str) -> ErdFile:
     """Read an ERD file from its bytes; ``path`` names it in complaints and leads to its binary numbers.
 
@@ -173,7 +167,7 @@ class _Header:
             self.lines += 1
             if text.upper() == "END":
                 return
-            if end < 0 or self.lines == MAX_HEADER_LINES or self.size > MAX_HEADER_BYTES:
+            if end < 0 or self.size > MAX_HEADER_BYTES:
                 raise BadInput(f"{file}:{self.lines}: expected a line END after the header")
             if self.lines == 2:
                 self._second = text
@@ -336,7 +330,7 @@ def read_profile(path: Path | str, resample_m: float | None = None, judged: bool
     """
     path = file_in(path, PROFILE_NAME)
     data = read_bounded(path, MAX_BYTES)
-    found = (_from_erd(parse_erd(data, path), str(path), resample_m) if is_erd(data) else
+    found = (_from_erd(parse_erd(data, path), str(path), resample_m) if data.lstrip().startswith(b"ERDFILEV") else
              _from_table(*parse_table(data, str(path)), resample_m))
     if judged:
         check_road(found, str(path))

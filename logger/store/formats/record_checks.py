@@ -21,7 +21,7 @@ import numpy as np
 
 from drivers.readings import STANDARD_GRAVITY_MPS2
 from logger.arrays import Array, Bools
-from logger.bounds import LONGEST_HOLE_S, SIGNAL
+from logger.bounds import LONGEST_HOLE_S, MOVING_MPS, SIGNAL
 from logger.dsp import repeated_samples
 from logger.errors import BadInput
 from logger.files import file_in, read_bounded
@@ -36,7 +36,6 @@ UNITS = ("mps2", "g")
 OWN_RATE = 0.0
 LEAST_RATE_HZ = 100.0
 MOST_RATE_HZ = 10_000.0
-_MOVING_MPS = 3.0
 _HOLES = 0.02  # of the time
 
 
@@ -180,7 +179,7 @@ def even_columns(columns: Mapping[str, Array], file: str, asked: RecordRules) ->
     samples do not hold cannot be estimated, so BadInput where fewer than 80 a second are left."""
     least_for_roads_hz = 79.9
     names = [name for name in columns if name not in (TIME, VERTICAL)]
-    moving = np.abs(columns[SPEED]) > _MOVING_MPS
+    moving = np.abs(columns[SPEED]) > MOVING_MPS
     found = even_record(columns[TIME], {VERTICAL: columns[VERTICAL]}, {name: columns[name] for name in names}, file,
                         asked, moving)
     if found.resampled is not None and found.resampled.from_hz < least_for_roads_hz:
@@ -333,9 +332,7 @@ def read_channels(path: Path | str, only: Sequence[str] = ()) -> ChannelRecord:
         return (TIME, *wanted) if good and len(wanted) <= max_channels else None
 
     header = f"a header with {TIME},{wished}, each once, at most {max_channels}"
-    wanted, table, file = parse_columns(read_bounded(path, MAX_BYTES), file, choose, header)
-    if len(table) < 2:
-        raise BadInput(f"{place(file, 1)}: expected at least two samples, found the end of the file")
+    wanted, table, file = parse_columns(read_bounded(path, MAX_BYTES), file, choose, header, of_samples=True)
     samples = np.stack([taken(SIGNAL, name, column, file)
                         for name, column in zip(wanted[1:], table.T[1:], strict=True)], axis=1)
     for column, name in enumerate(wanted[1:]):

@@ -71,9 +71,7 @@ def read_columns(path: Path | str) -> tuple[str, Array, dict[str, Array], Array 
     Raises BadInput ("file:line: expected ..., found ...") but for times that are not even.
     """
     path = file_in(path, DRIVE_NAME)
-    wanted, table, file = parse_columns(read_bounded(path, MAX_BYTES), str(path), _choose, _HEADER)
-    if len(table) < 2:
-        raise BadInput(f"{place(file, 1)}: expected at least two samples, found the end of the file")
+    wanted, table, file = parse_columns(read_bounded(path, MAX_BYTES), str(path), _choose, _HEADER, of_samples=True)
     columns = dict(zip(wanted[1:], table.T[1:], strict=True))
     usable = columns.pop(USABLE, None)
     return file, taken(bounds.TIME, TIME, table[:, 0], file), {

@@ -28,7 +28,7 @@ import yaml
 from logger.arrays import Array
 from logger.errors import BadInput
 from logger.estimation.rms_calibration import METHOD, CalibrationSettings, RmsLine, SpeedCalibration
-from logger.files import json_sha256, make_folder, read_bounded, replace_bytes, write_text
+from logger.files import STATE_BYTES, json_sha256, make_folder, read_bounded, replace_bytes, write_text
 from logger.printable import LONGEST_COMPLAINT, LONGEST_WORD, word
 from logger.shipped import shipped
 from logger.store.formats.yaml_nodes import Node, load_mapping
@@ -483,7 +483,6 @@ def _number(value: float) -> float:
 
 FORMAT = 1
 KEPT = 16  # the oldest goes first
-MAX_BYTES = 1_000_000
 
 _GAIN_PROBES_HZ = np.geomspace(0.01, 100.0, 200)
 
@@ -551,7 +550,7 @@ def _cache_folder() -> Path:
 def _read_file(path: Path) -> dict[str, tuple[SpeedCalibration, ...]]:
     """All calibrations of a file; empty for a file that is not whole, of this format, and what it says it is."""
     try:
-        content = json.loads(read_bounded(path, MAX_BYTES))
+        content = json.loads(read_bounded(path, STATE_BYTES))
         if content["format"] != FORMAT or content["sha256"] != json_sha256(content["calibrations"]):
             return {}
         return {key: tuple(map(_speed, speeds)) for key, speeds in content["calibrations"].items()}

@@ -7,9 +7,7 @@ from pathlib import Path
 
 from drivers import plain_yaml
 from logger.errors import BadInput, did_you_mean
-from logger.files import read_bounded
-
-MAX_BYTES = 256 * 1024
+from logger.files import SETTINGS_BYTES, read_bounded
 
 
 class Node(plain_yaml.Node):
@@ -28,7 +26,7 @@ class Node(plain_yaml.Node):
 
 def load_mapping(path: Path | str) -> Node:
     """Read a YAML file whose top is a mapping. Raises BadInput, which names file and line, for anything else."""
-    data = read_bounded(path, MAX_BYTES)
+    data = read_bounded(path, SETTINGS_BYTES)
     try:
         text = data.decode("utf-8")
     except UnicodeDecodeError as error:

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime, timedelta
+from datetime import datetime, timedelta
 from hashlib import sha256
 from itertools import accumulate
 from pathlib import Path
@@ -19,10 +19,8 @@ from logger.geodesy import apart_m
 from logger.printable import word, words_in
 from logger.records import WindowRecord
 from logger.store.log.log_name import finished_path, inside_of, log_name, name_before
-from logger.store.log.row_format import read_log, write_utc
+from logger.store.log.row_format import EPOCH, read_log, write_utc
 from logger.store.log.sidecar import read_sidecar
-
-_EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
 
 
 @dataclass(frozen=True)
@@ -199,7 +197,7 @@ def end_utc_us(record: WindowRecord) -> int | None:
 
 def utc(utc_us: int) -> datetime:
     """An instant [us since 1970] as a date and time."""
-    return _EPOCH + timedelta(microseconds=utc_us)
+    return EPOCH + timedelta(microseconds=utc_us)
 
 
 def iso_utc(utc_us: int | None) -> str | None:

@@ -154,8 +154,7 @@ def repair_part(files: FileSystem, part: Path, limit: int | None, clock: sidecar
 
 
 def _is_damaged(files: FileSystem, finished: Path) -> bool:
-    found = sidecars.IntactRows(files, (finished,))
-    tally = sidecars.take_tally(found)
+    tally = tally_of(files, finished)
     return bool(tally.damaged_lines or tally.torn_tail)
 
 

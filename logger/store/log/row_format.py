@@ -15,30 +15,29 @@ import re
 import zlib
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from datetime import datetime, timedelta
+from datetime import UTC, datetime, timedelta
 from math import isfinite
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
 from drivers.disk import open_regular
+from drivers.errors import shortened
 from logger.errors import BadInput
 from logger.records import WindowRecord
 from logger.units import US_PER_S
 
 LINE_BYTES = 4096  # More than any row; a longer line is taken for several damaged ones
 LARGEST = 1e9  # Beyond any quantity of a row in the unit of its column; what is larger is not known, and not read
-_EPOCH = datetime(1970, 1, 1)
-LATEST_US = (datetime(2200, 1, 1) - _EPOCH) // timedelta(microseconds=1)
+EPOCH = datetime(1970, 1, 1, tzinfo=UTC)
+LATEST_US = (datetime(2200, 1, 1, tzinfo=UTC) - EPOCH) // timedelta.resolution
 """From here on no instant is written or read [us since 1970]."""
-_MICROSECOND = timedelta(microseconds=1)
 _UTC = re.compile(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d\.\d{3}Z")
-_SECONDS = re.compile(r"(-?)(0|[1-9][0-9]{0,9})\.([0-9]{6})")
+_SECONDS = re.compile(r"(-(?!0\.0{6}))?(0|[1-9][0-9]{0,9})\.([0-9]{6})")
 _COUNT = re.compile(r"0|-?[1-9][0-9]{0,17}")
 _COMFORT = re.compile("[a-z_]{0,40}")
 _CLASS = re.compile("[A-H]?")
 FLAGS = re.compile("[a-z_]{1,40}(?:[|][a-z_]{1,40})*")
 """Words of a row are names of our own; one of a newer logger may be another, and is none that could do harm."""
-_SHOWN = 40
 _ROW_END = re.compile(rb",[0-9a-f]{8}")
 
 
@@ -63,15 +62,15 @@ def write_utc(utc_us: int | None) -> str:
     """An instant [us since 1970] as ISO 8601 with milliseconds; nothing where it is not known, or from 2200 on."""
     if utc_us is None or not 0 <= utc_us < LATEST_US:
         return ""
-    return (_EPOCH + timedelta(microseconds=int(utc_us))).isoformat(timespec="milliseconds") + "Z"
+    return (EPOCH + timedelta(microseconds=int(utc_us))).isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
 def _read_utc(text: str) -> int | None:
     if not text:
         return None
     if not _UTC.fullmatch(text):
-        raise BadRow(f"expected UTC such as 2026-07-04T10:15:00.250Z, found {text[:_SHOWN]!a}")
-    utc_us = (datetime.fromisoformat(text[:-1]) - _EPOCH) // _MICROSECOND
+        raise BadRow(f"expected UTC such as 2026-07-04T10:15:00.250Z, found {shortened(text, 40)}")
+    utc_us = (datetime.fromisoformat(text) - EPOCH) // timedelta.resolution
     if not 0 <= utc_us < LATEST_US:
         raise BadRow(f"expected UTC from 1970 to 2199, found {text!a}")
     return utc_us
@@ -85,16 +84,14 @@ def _write_seconds(t_us: int) -> str:
 def _read_seconds(text: str) -> int:
     match = _SECONDS.fullmatch(text)
     if not match:
-        raise BadRow(f"expected seconds with six decimals, found {text[:_SHOWN]!a}")
+        raise BadRow(f"expected seconds with six decimals, found {shortened(text, 40)}")
     t_us = int(match[2]) * US_PER_S + int(match[3])
-    if match[1] and not t_us:
-        raise BadRow(f"expected seconds with six decimals, found {text!a}")
     return -t_us if match[1] else t_us
 
 
 def _read_count(text: str) -> int:
     if not _COUNT.fullmatch(text):
-        raise BadRow(f"expected a whole number, found {text[:_SHOWN]!a}")
+        raise BadRow(f"expected a whole number, found {shortened(text, 40)}")
     return int(text)
 
 
@@ -102,9 +99,9 @@ def _read_decimal(text: str, pattern: str, largest: float) -> float:
     """A number as the pattern writes it, and in no other way."""
     value = float(text)
     if not isfinite(value) or pattern % value != text:
-        raise BadRow(f"expected a finite number such as {pattern % 1.5}, found {text[:_SHOWN]!a}")
+        raise BadRow(f"expected a finite number such as {pattern % 1.5}, found {shortened(text, 40)}")
     if abs(value) > largest:
-        raise BadRow(f"expected a number up to {largest:g}, found {text[:_SHOWN]!a}")
+        raise BadRow(f"expected a number up to {largest:g}, found {shortened(text, 40)}")
     return value
 
 
@@ -143,7 +140,7 @@ def _word(name: str, known: re.Pattern[str], meaning: str) -> LogColumn:
 
 def _read_word(text: str, known: re.Pattern[str]) -> str:
     if not known.fullmatch(text):
-        raise BadRow(f"expected a word that a logger writes, found {text[:_SHOWN]!a}")
+        raise BadRow(f"expected a word that a logger writes, found {shortened(text, 40)}")
     return text
 
 
@@ -227,7 +224,7 @@ def parse_row(text: str) -> WindowRecord:
         return WindowRecord(**{column.attribute: column.read(field)
                                for column, field in zip(COLUMNS, fields, strict=False)})
     except ValueError as error:  # a number or a date that is none
-        raise BadRow(str(error)[:2 * _SHOWN]) from None
+        raise BadRow(str(error)[:80]) from None
 
 
 def as_now(text: str, record: WindowRecord) -> str:

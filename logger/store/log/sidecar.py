@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from drivers.disk import FileSystem
-from logger.files import json_sha256
+from logger.files import STATE_BYTES, json_sha256
 from logger.records import WindowRecord
 from logger.store.log.atomic_file import replace_file
 from logger.store.log.log_name import log_name, sidecar_path
@@ -171,8 +171,6 @@ def _add(holes: list[Hole], hole: Hole) -> None:
         holes[-1] = Hole(holes[-1].first, hole.last)
 
 
-SIDECAR_BYTES = 1_000_000
-"""Most that is read as a sidecar: a settings file and a vehicle, of at most 256 kB each, and a few words."""
 
 UNCHECKED = "taken_over_unchecked"  # In a sidecar that a repair has made of one without a checksum
 SETTINGS_LOST = "settings_lost"  # In a sidecar that a repair has made where there was none that could be read
@@ -197,17 +195,17 @@ class Sidecar:
 
 def load_sidecar(log: Path, files: FileSystem | None = None) -> Sidecar | None:
     """The sidecar of a log file, open or finished; None when it is missing. Raises ``ValueError`` when it is damaged,
-    a link, nested too deep or larger than ``SIDECAR_BYTES``, and ``OSError``."""
+    a link, nested too deep or larger than ``STATE_BYTES``, and ``OSError``."""
     path = sidecar_path(log)
     if path.is_symlink():
         raise ValueError("expected a file of its own, found a link to another")
     try:
         with (files or FileSystem()).open(path) as file:
-            text = file.read(SIDECAR_BYTES + 1)
+            text = file.read(STATE_BYTES + 1)
     except FileNotFoundError:
         return None
-    if len(text) > SIDECAR_BYTES:
-        raise ValueError(f"expected at most {SIDECAR_BYTES} bytes")
+    if len(text) > STATE_BYTES:
+        raise ValueError(f"expected at most {STATE_BYTES} bytes")
     try:
         found = json.loads(text)
     except RecursionError:

@@ -9,9 +9,10 @@ import pytest
 
 from logger.estimation import rms_calibration
 from logger.estimation.rms_calibration import CalibrationSettings, RmsLine, SpeedCalibration
+from logger.files import STATE_BYTES
 from logger.shipped import shipped, vehicle_file
 from logger.store.formats import vehicle_file as module
-from logger.store.formats.vehicle_file import KEPT, MAX_BYTES, find, fingerprint, keep, places, read_vehicle
+from logger.store.formats.vehicle_file import KEPT, find, fingerprint, keep, places, read_vehicle
 from logger.vehicle.vehicle import SensorPlace
 
 RAV4 = read_vehicle(vehicle_file("rav4-2009"))
@@ -65,7 +66,7 @@ def content(calibrations: object, **changes: object) -> str:
 
 
 @pytest.mark.parametrize("text", [
-    "", "null", "[]", "3", "[" * 100_000, "\x00", '{"format": 1}', " " * (MAX_BYTES + 1),
+    "", "null", "[]", "3", "[" * 100_000, "\x00", '{"format": 1}', " " * (STATE_BYTES + 1),
     content({"a": []}, format=2), content({"a": []}, sha256="0" * 64), content([]), content("a"), content({"a": [{}]}),
     content({"a": [3]}), content({"a": 3}), content({"a": [{"speed_mps": 1.0, "iri_per_accel_rms": {"slope": 1}}]}),
 ])

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from logger.errors import BadInput
+from logger.files import SETTINGS_BYTES
 from logger.printable import word
 from logger.shipped import vehicle_file, vehicle_names
 from logger.store.formats.effect_file import shipped_effects
@@ -21,7 +22,7 @@ from logger.store.formats.vehicle_file import (
     read_vehicle,
     write_model,
 )
-from logger.store.formats.yaml_nodes import MAX_BYTES, parse_mapping
+from logger.store.formats.yaml_nodes import parse_mapping
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.models import MODELS, structure_of
 from logger.vehicle.modes import undamped_frequencies_hz
@@ -292,7 +293,7 @@ def test_files_that_cannot_be_read(tmp_path: Path) -> None:
     path.write_bytes(b"name: x\nmodel: \xff\n")
     with pytest.raises(BadInput, match=r"car\.yaml:2: expected UTF-8"):
         read_vehicle(path)
-    path.write_bytes(b"#" * (MAX_BYTES + 1))
+    path.write_bytes(b"#" * (SETTINGS_BYTES + 1))
     with pytest.raises(BadInput, match="expected at most"):
         read_vehicle(path)
 

@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from drivers.disk import FileSystem
+from logger.files import STATE_BYTES
 from logger.records import WindowRecord
 from logger.store.integrity import verify
 from logger.store.log import row_format, sidecar
@@ -18,7 +19,7 @@ from logger.store.log.log_name import COUNTER_NAME, next_session
 from logger.store.log.log_writer import SegmentLog
 from logger.store.log.recovery import repair
 from logger.store.log.row_format import HEADER, format_row, parse_row, read_log
-from logger.store.log.sidecar import SIDECAR_BYTES, ClockMap, read_sidecar
+from logger.store.log.sidecar import ClockMap, read_sidecar
 
 from ...support.slow import slow
 
@@ -457,7 +458,7 @@ def _fresh(parent: Path, name: str) -> Path:
 @pytest.mark.parametrize(("content", "reason"), [
     (b"[" * 100_000, "nesting"),
     (b'{"a":' * 100_000, "nesting"),
-    (b"{}" + b" " * SIDECAR_BYTES, "at most"),
+    (b"{}" + b" " * STATE_BYTES, "at most"),
     (b"\xff", "JSON object"),
     (b"{", "JSON object"),
     (b"[]", "JSON object"),
@@ -486,7 +487,7 @@ def test_a_clock_that_cannot_be_is_none(tmp_path: Path, offset_us: object) -> No
 
 
 def test_a_sidecar_of_the_largest_size_is_read(tmp_path: Path) -> None:
-    (tmp_path / "00001-001.json").write_bytes(b"{}" + b" " * (SIDECAR_BYTES - 2))
+    (tmp_path / "00001-001.json").write_bytes(b"{}" + b" " * (STATE_BYTES - 2))
     assert read_sidecar(tmp_path / "00001-001.csv") == {}
 
 

@@ -43,11 +43,12 @@ from logger.service.main_loop import HANG_US, Listener, MainLoop, monotonic_us
 from logger.service.serve import StatusReporter
 from logger.service.status import ServiceStatus
 from logger.service.storage import Storage
-from logger.service.supervisor import LONGEST_WAIT_US, Supervisor
+from logger.service.supervisor import Supervisor
 from logger.service.timebase import LASTING_US
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_model
 from logger.store.log.disk_quota import QuotaLimits
+from logger.store.log.log_writer import LONGEST_WAIT_US
 from logger.store.log.row_format import read_log
 
 from ..drives.replay import Rows, parts_for
