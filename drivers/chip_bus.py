@@ -297,8 +297,8 @@ class BufferedDecoder(ABC):
     check: ClassVar[str] = ("Check the wires of the bus, its clock (400 kHz for 400 samples a second and more), and "
                             "what else keeps the computer busy")
 
-    def __init__(self, rate_hz: int, rate_tolerance: float) -> None:
-        self._samples = DatedSamples(rate_hz, rate_tolerance)
+    def __init__(self, rate_hz: int) -> None:
+        self._samples = DatedSamples(rate_hz)
         self._overruns = 0
 
     @abstractmethod

@@ -566,7 +566,7 @@ class DatedSamples:
                  ``JUDGED_SAMPLES``: twice the middle one's delay, as delays are even from none to that long
     """
 
-    def __init__(self, rate_hz: float, tolerance: float) -> None:
+    def __init__(self, rate_hz: float, tolerance: float = SampleClock.OTHER_TOLERANCE) -> None:
         self.clock = SampleClock(rate_hz, tolerance)
         self._rate_hz = rate_hz
         self._tolerance = tolerance

@@ -24,6 +24,8 @@ from drivers.readings import AccelerationBlock, Kind, RecordedWords
 from drivers.sources import SerialSource, Source, serial_advice
 
 SERIAL_WAIT_S = 0.5
+SERIAL_NOISE_MPS2 = 0.05
+"""R.m.s. noise of a sensor that samples by its own clock, on the 100 Hz grid, where nothing states it."""
 
 Settings = TypeVar("Settings")
 

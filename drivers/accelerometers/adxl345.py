@@ -65,7 +65,6 @@ ENTRY_BYTES = 6
 COUNTS_PER_G = 256
 NOISE_MPS2 = 1.1 / COUNTS_PER_G * STANDARD_GRAVITY_MPS2  # Z at 100 Hz, 1.1 LSB r.m.s.; on the 100 Hz grid at any rate
 TURN_ON_S = 0.0011  # and one sample (Table 1)
-RATE_TOLERANCE = 0.02  # the data sheet states none; a rate that is further off is found out
 
 log = logging.getLogger(__name__)
 
@@ -134,9 +133,6 @@ class Adxl345Decoder(BufferedDecoder):
     """Answers of ``Adxl345.read``: INT_SOURCE, FIFO_STATUS, then X, Y, Z of each entry, low byte first."""
 
     name = "adxl345"
-
-    def __init__(self, rate_hz: int) -> None:
-        super().__init__(rate_hz, RATE_TOLERANCE)
 
     def _decoded(self, data: bytes) -> Entries:
         count, rest = divmod(len(data) - 2, ENTRY_BYTES)

@@ -34,7 +34,13 @@ from drivers.accelerometers._iio_device import (
     read_description,
     understood,
 )
-from drivers.accelerometers.accelerometer import SERIAL_WAIT_S, Accelerometer, ReadingQuality, setting
+from drivers.accelerometers.accelerometer import (
+    SERIAL_NOISE_MPS2,
+    SERIAL_WAIT_S,
+    Accelerometer,
+    ReadingQuality,
+    setting,
+)
 from drivers.errors import BadReply, NotPresent, SettingsLost
 from drivers.hardware import Machine
 from drivers.readings import (
@@ -54,8 +60,6 @@ from drivers.sources import Deadlines, SerialSource, Source
 CHECK_US = US_PER_S
 DESCRIBE_US = 10 * US_PER_S
 LONGEST_QUEUED_US = 10 * US_PER_S  # more than a buffer of BUFFER_S holds
-NOISE_MPS2 = 0.05  # r.m.s. on the 100 Hz grid where the settings do not say it: as of a serial sensor
-RATE_TOLERANCE = 0.02  # drivers name nominal rates
 SCANS, VALUES, DESCRIPTION = b"s", b"p", b"{"
 
 
@@ -70,7 +74,7 @@ class IioConfig:
     device: str = setting(AUTO, Text())
     rate_hz: int = setting(200, Whole(100, 1000))
     scale_mps2: float | None = setting(None, OrNone("auto", Decimal(*_STEP_MPS2)))
-    noise_mps2: float = setting(NOISE_MPS2, Decimal(*_NOISE_MPS2))
+    noise_mps2: float = setting(SERIAL_NOISE_MPS2, Decimal(*_NOISE_MPS2))
 
 
 class IioSource:
@@ -275,7 +279,7 @@ class IioDecoder:
             self._dated.flush()
             self._blocks.append(self._dated.take())
         self._layout = layout
-        self._dated = None if layout.polled else DatedSamples(layout.rate_hz, RATE_TOLERANCE)
+        self._dated = None if layout.polled else DatedSamples(layout.rate_hz)
 
     def _take_scans(self, t_us: int, data: bytes, layout: ScanLayout, dated: DatedSamples) -> None:
         if not data or len(data) % layout.scan_bytes:

@@ -20,7 +20,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from drivers.accelerometers.accelerometer import ReadingQuality, SerialAccelerometer, setting
+from drivers.accelerometers.accelerometer import SERIAL_NOISE_MPS2, ReadingQuality, SerialAccelerometer, setting
 from drivers.errors import SettingsError
 from drivers.framing import Arrivals, FixedFramer, Frame, LineFramer, exclusive_or, numbers_in
 from drivers.plain_yaml import Node
@@ -45,8 +45,6 @@ from drivers.wire_profiles import (
     load_profile,
     shipped_profiles,
 )
-
-NOISE_MPS2 = 0.05  # r.m.s. noise of a serial sensor on the 100 Hz grid; no data sheet states it
 
 
 class _Found(NamedTuple):
@@ -270,7 +268,7 @@ class _Pasco(SerialAccelerometer[PascoConfig]):
 
     def readings(self, settings: PascoConfig) -> ReadingQuality:
         """Fine steps, at a rate that the decoder finds out."""
-        return ReadingQuality(NOISE_MPS2)
+        return ReadingQuality(SERIAL_NOISE_MPS2)
 
     def facts(self, settings: PascoConfig) -> dict[str, Any]:
         profile = load_profile(settings.profile)

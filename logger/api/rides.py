@@ -19,7 +19,6 @@ from logger.comfort.iso2631 import (
     COMFORT_FACTORS,
     HEALTH_FACTORS,
     LEAST_TAKEN_HZ,
-    LOWEST_RATE_HZ,
     AxisFigures,
     CautionZone,
     RideComfort,
@@ -29,6 +28,7 @@ from logger.comfort.iso2631 import (
     ride_comfort,
     total,
 )
+from logger.dsp.design import LOWEST_RATE_HZ
 from logger.dsp.weightings.weighting import Weighting
 from logger.errors import BadInput
 from logger.plugins import catalogue

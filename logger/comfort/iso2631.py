@@ -10,6 +10,7 @@ import numpy as np
 
 from logger.arrays import Array
 from logger.bounds import time_hint
+from logger.dsp.design import LOWEST_RATE_HZ
 from logger.dsp.filters import BlockFilter
 from logger.dsp.weightings.weighting import Weighting
 
@@ -281,7 +282,6 @@ def caution_zone(hours: float, exponent: int) -> CautionZone:
     raise ValueError(f"the zone is drawn for exponents 2 and 4, not {exponent}")
 
 
-LOWEST_RATE_HZ = 80.0
 LEAST_TAKEN_HZ = 40.0  # Below, what a record shows ends within the 4 to 12.5 Hz that Wk counts most, or close above
 
 

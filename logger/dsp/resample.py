@@ -207,7 +207,7 @@ def _lagrange(t_us: Times, values: Array, at_us: Times) -> Array:
 
 PASS_HZ = 38.0
 STOP_HZ = 62.0
-SLOW_RATE_HZ = 100
+GRID_RATE_HZ = 100
 STOP_DB = 65.0
 BLOCK = 16
 BRIDGED_SHARE = 0.5
@@ -219,7 +219,7 @@ def decimation_taps(factor: int) -> Array:
     Passes 0-38 Hz within 0.01 dB and stops what would fold into that band, from 62 Hz up, by 64 dB; half the
     amplitude at 50 Hz. h is a multiple of ``factor``.
     """
-    width = 2.0 * math.pi * (STOP_HZ - PASS_HZ) / (SLOW_RATE_HZ * factor)
+    width = 2.0 * math.pi * (STOP_HZ - PASS_HZ) / (GRID_RATE_HZ * factor)
     half = factor * math.ceil(kaiser_half_length(STOP_DB, width) / factor)
     return low_pass_taps(half, factor, 1.0, STOP_DB)
 
@@ -308,10 +308,10 @@ class Decimator:
         shares = self._marks[:, :used].reshape(2, len(values), self._factor).mean(axis=2)
         clipped, bridged = shares[0] > 0.0, shares[1] >= BRIDGED_SHARE
         each, each_clipped = self._each[:, :used].reshape(2, len(values), self._factor)
-        run = GridRun(self._next_us, SLOW_RATE_HZ, values, values, clipped, bridged, self._new_start, each,
+        run = GridRun(self._next_us, GRID_RATE_HZ, values, values, clipped, bridged, self._new_start, each,
                       each_clipped > 0)
         self._marks, self._each = self._marks[:, used:], self._each[:, used:]
-        self._next_us += len(values) * US_PER_S // SLOW_RATE_HZ
+        self._next_us += len(values) * US_PER_S // GRID_RATE_HZ
         self._new_start = False
         return run
 

@@ -256,7 +256,6 @@ class CarBiases:
     group            cars that can be compared share a number; the largest group is 0
     known            the gain follows from roads shared with other cars
     growth_per_year  of the mean road's IRI, as a fraction; NaN: the passes do not show it
-    growth_std       of roads' own growth about that, as a fraction a year
     pass_std         relative standard deviation of a pass; NaN: too few drives repeat a road
     session_std      of it, what all passes of a session share; NaN likewise
     repeats          drives over roads that the same car has driven before, as far as they show how drives scatter
@@ -268,7 +267,6 @@ class CarBiases:
     group: Codes
     known: npt.NDArray[np.bool_]
     growth_per_year: float
-    growth_std: float
     pass_std: float
     session_std: float
     repeats: int
@@ -308,7 +306,7 @@ def car_biases(passes: RoadPasses, cars: int) -> CarBiases:
     repeats, needed = _repeats(passes, cars), least_repeats + design.is_timed
     if repeats < needed:
         return CarBiases(np.ones(cars), np.zeros(cars), design.group, np.zeros(cars, dtype=np.bool_), np.nan, np.nan,
-                         np.nan, np.nan, repeats, needed)
+                         np.nan, repeats, needed)
     for _ in range(rounds):
         design = Elimination(passes, cars, variances.weights(passes), variances.ridge)
         _, residual = _fitted(design)
@@ -321,7 +319,7 @@ def car_biases(passes: RoadPasses, cars: int) -> CarBiases:
     known = np.bincount(group)[group] > 1
     between = float(np.std(log_gain[known], ddof=1)) if known.sum() > 1 else 0.0
     return CarBiases(np.where(known, np.exp(log_gain), 1.0), np.where(known, log_std, between), group, known,
-                     float(effects[-1]) if design.is_timed else np.nan, float(np.sqrt(variances.of_growth)),
+                     float(effects[-1]) if design.is_timed else np.nan,
                      float(np.sqrt(variances.of_pass + variances.of_session)), float(np.sqrt(variances.of_session)),
                      repeats, needed)
 

@@ -424,5 +424,6 @@ def _table(by: str, key: Keys, lat_deg: Array, lon_deg: Array, heading_deg: Arra
     hard = a_w_mps2 >= uncomfortable_mps2
     words = np.array(["|".join(word for word, holds in zip(("rough", "worse", "uncomfortable"), three, strict=True)
                                if holds) for three in zip(rough, worse, hard, strict=True)], dtype=np.str_)
-    return RoadTable(*vars(figures).values(), by, key, lat_deg, lon_deg, heading_deg, length_m, cars.astype(np.int64),
-                     passes, mean_years, a_w_mps2, speed_mps, last_us.astype(np.int64), worse, words)
+    return RoadTable(**vars(figures), by=by, key=key, lat_deg=lat_deg, lon_deg=lon_deg, heading_deg=heading_deg,
+                     length_m=length_m, cars=cars.astype(np.int64), passes=passes, mean_years=mean_years,
+                     a_w_mps2=a_w_mps2, speed_mps=speed_mps, last_us=last_us.astype(np.int64), worse=worse, visit=words)

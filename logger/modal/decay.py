@@ -328,14 +328,13 @@ def _unsupported(poles: Complex, diagram: tuple[OrderPoles, ...]) -> list[Reject
 
 @dataclass(frozen=True)
 class Decrement:
-    """Damping ratio and frequency [Hz] with standard deviations; times (n,) [s] and heights (n,) of the peaks used."""
+    """Damping ratio and frequency [Hz] with standard deviations; times (n,) [s] of the peaks used."""
 
     damping_ratio: float
     damping_std: float
     frequency_hz: float
     frequency_std_hz: float
     peak_s: Array
-    peak_height: Array
 
 
 def damping_of_two_peaks(first: float, later: float, cycles: int) -> float:
@@ -365,7 +364,7 @@ def log_decrement(samples: Array, rate_hz: float) -> Decrement:
     damped_hz = 1 / period_s
     ratio = decrement / np.hypot(2 * np.pi, decrement)
     return Decrement(float(ratio), float(decrement_std / (2 * np.pi)), float(damped_hz / np.sqrt(1 - ratio**2)),
-                     float(period_std_s * damped_hz**2), time_s, height)
+                     float(period_std_s * damped_hz**2), time_s)
 
 
 def decrement_mode(samples: Array, rate_hz: float) -> ModalResult:

@@ -29,14 +29,13 @@ from logger.comfort.iso2631 import RunningRms, comfort_word
 from logger.comfort.uncertain_ride import NO_FIGURES, NoiseFloor, RawFigures, RideFigures, Uncertain
 from logger.dsp.filters import BlockFilter, SectionRows, butterworth_sos, frequency_response
 from logger.dsp.fixed_point import FixedFilter
-from logger.dsp.resample import Decimator, GridResampler, GridRun
+from logger.dsp.resample import GRID_RATE_HZ, Decimator, GridResampler, GridRun
 from logger.dsp.weightings.weighting import DELAY_SAMPLES, Weighting
 from logger.dsp.windows import GridSamples, Window, joined
 from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.estimation.streaming import WindowEstimate
 from logger.units import US_PER_S
 
-GRID_RATE_HZ = 100
 GRID_STEP_US = US_PER_S // GRID_RATE_HZ
 GRAVITY_CORNER_HZ = 0.2
 SETTLING_S = 4.0

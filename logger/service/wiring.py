@@ -25,6 +25,7 @@ from drivers.readings import BAUDS, GPS, RecordedWords
 from logger.comfort.uncertain_ride import NoiseFloor
 from logger.dsp.filters import BlockFilter
 from logger.dsp.fixed_point import FixedFilter
+from logger.dsp.resample import GRID_RATE_HZ
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.errors import BadInput
 from logger.estimation.car_response import LOG_WAVES, WAVE_NUMBERS_CPM, CarResponse
@@ -49,14 +50,7 @@ from logger.service.config import (
 from logger.service.drive_readings import RangeUse
 from logger.service.learning import DELAY, NOISE, KnownNoise, delay_at_start, is_loggers
 from logger.service.pipeline import Pipeline, PipelineSettings
-from logger.service.signal_chain import (
-    GRID_RATE_HZ,
-    Axis,
-    ComfortColumns,
-    SignalChain,
-    recorder_gain,
-    weighted_response,
-)
+from logger.service.signal_chain import Axis, ComfortColumns, SignalChain, recorder_gain, weighted_response
 from logger.shipped import vehicle_file, vehicle_names, vehicle_path, version
 from logger.store.formats.vehicle_file import CarModel, read_on_board
 from logger.units import WINDOW_M
