@@ -28,8 +28,7 @@ from logger.comfort.iso2631 import (
     ride_comfort,
     total,
 )
-from logger.dsp.design import LOWEST_RATE_HZ
-from logger.dsp.weightings.weighting import Weighting
+from logger.dsp.weightings.weighting import LOWEST_RATE_HZ, Weighting
 from logger.errors import BadInput
 from logger.plugins import catalogue
 from logger.question import function

@@ -10,9 +10,8 @@ import numpy as np
 
 from logger.arrays import Array
 from logger.bounds import time_hint
-from logger.dsp.design import LOWEST_RATE_HZ
 from logger.dsp.filters import BlockFilter
-from logger.dsp.weightings.weighting import Weighting
+from logger.dsp.weightings.weighting import LOWEST_RATE_HZ, Weighting
 
 # Table 2.5 (ISO 2631-1 Annex C.2.3): lower bounds [m/s2]. The ranges overlap on purpose; here the more severe word
 # holds wherever two would do.

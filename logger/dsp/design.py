@@ -29,10 +29,9 @@ import numpy.typing as npt
 
 from logger.arrays import Array, Complex
 from logger.dsp.filters import butterworth_sos, frequency_response
-from logger.dsp.weightings.weighting import DELAY_SAMPLES, Sections, Weighting
+from logger.dsp.weightings.weighting import DELAY_SAMPLES, LOWEST_RATE_HZ, Sections, Weighting
 
 TOLERANCE_DB = 0.02
-LOWEST_RATE_HZ = 80.0
 FIT_OF_RATE = 0.48  # the fit ends at this share of the sample rate
 PROMISE_OF_RATE = 0.4
 PHASE_WEIGHT = 0.3  # radians against nepers

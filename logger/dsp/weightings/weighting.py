@@ -28,6 +28,8 @@ Sections = tuple[tuple[float, float, float, float, float, float], ...]
 # Without them, magnitude and phase cannot both be met up to near half the sample rate (see ``logger.dsp.design``).
 DELAY_SAMPLES = 5
 
+LOWEST_RATE_HZ = 80.0  # of a record that is weighted
+
 # After this many periods of the lower band limit a weighting has forgotten a blow to one part in 10^12.
 MEMORY_PERIODS = 10.0
 
