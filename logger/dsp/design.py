@@ -142,17 +142,9 @@ class _Fit:
             broad = (slice(None),) + (np.newaxis,) * (values.ndim - 1)
             return np.concatenate([self.magnitude_weight[broad] * values.real, self.phase_weight[broad] * values.imag])
 
-        found = least_squares(
-            lambda x: weighted(self.misfit(np.append(x, delay))),
-            start[:count],
-            jac=lambda x: weighted(self.slopes(np.append(x, delay))[:, :count]),
-            x_scale="jac",
-            method="lm",
-            max_nfev=EVALUATIONS,
-            ftol=1e-8,
-            xtol=1e-8,
-            gtol=1e-14,
-        )
+        found = least_squares(lambda x: weighted(self.misfit(np.append(x, delay))), start[:count],
+                              jac=lambda x: weighted(self.slopes(np.append(x, delay))[:, :count]), x_scale="jac",
+                              method="lm", max_nfev=EVALUATIONS, ftol=1e-8, xtol=1e-8, gtol=1e-14)
         return np.append(found.x, delay)
 
     def start_from_analog(self, low_pass_zero: float) -> Array:
@@ -219,10 +211,8 @@ def design_error(weighting: Weighting, sections: Sections, rate_hz: float, band_
     """Worst departure of ``sections`` from the formula at the frequencies ``band_hz`` [Hz], their delay taken out."""
     delay = np.exp(2j * np.pi * band_hz / rate_hz * DELAY_SAMPLES)
     ratio = frequency_response(sections, band_hz, rate_hz) * delay / weighting.response(band_hz)
-    return DesignError(
-        magnitude_db=float(np.abs(20.0 * np.log10(np.abs(ratio))).max()),
-        phase_deg=float(np.degrees(np.abs(np.angle(ratio))).max()),
-    )
+    return DesignError(magnitude_db=float(np.abs(20.0 * np.log10(np.abs(ratio))).max()),
+                       phase_deg=float(np.degrees(np.abs(np.angle(ratio))).max()))
 
 
 def design_sections(weighting: Weighting, rate_hz: float) -> Sections:

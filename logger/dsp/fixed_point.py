@@ -265,11 +265,8 @@ def _fitted(row: Array, paths: list[_Path], data_bits: int) -> tuple[float, Fixe
     reach = _bound([(largest, _response(row[:3] * UNIT, a, response)) for largest, response in paths])
     room = largest_word(data_bits) - _bound(rounding)
     sum_room = largest_word(64) - carry - _bound(rounding) * recursion
-    gain = _SPARE * min(
-        room / reach,
-        sum_room / (_bound(paths) * total_b + reach * recursion),
-        largest_word(32) / largest_b,
-    )
+    gain = _SPARE * min(room / reach, sum_room / (_bound(paths) * total_b + reach * recursion),
+                        largest_word(32) / largest_b)
     b = _numerator(row[:3] * gain)
     reached = [(largest, _response(b, a, response)) for largest, response in paths] + rounding
     largest_output = math.ceil(_bound(reached))

@@ -54,10 +54,8 @@ def burg(parts: Sequence[Array], order: int, floor: float) -> Array:
             break
         r = -2 * sum(float(f @ b) for f, b in zip(forward, backward, strict=True)) / energy
         reflections[k] = r
-        forward, backward = (
-            [(f + r * b)[1:] for f, b in zip(forward, backward, strict=True)],
-            [(b + r * f)[:-1] for f, b in zip(forward, backward, strict=True)],
-        )
+        forward, backward = ([(f + r * b)[1:] for f, b in zip(forward, backward, strict=True)],
+                             [(b + r * f)[:-1] for f, b in zip(forward, backward, strict=True)])
     return reflections
 
 

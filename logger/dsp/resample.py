@@ -71,11 +71,8 @@ class _Readings:
         return _Readings(self.t_us[which], self.values[which], self.clipped[which])
 
     def then(self, later: _Readings) -> _Readings:
-        return _Readings(
-            np.concatenate([self.t_us, later.t_us]),
-            np.concatenate([self.values, later.values]),
-            np.concatenate([self.clipped, later.clipped]),
-        )
+        return _Readings(np.concatenate([self.t_us, later.t_us]), np.concatenate([self.values, later.values]),
+                         np.concatenate([self.clipped, later.clipped]))
 
 
 _NO_READINGS = _Readings(np.empty(0, dtype=np.int64), np.empty(0), np.empty(0, dtype=np.bool_))

@@ -140,23 +140,13 @@ class _Open:
         if count == 0 or (blind and self._absent == count):
             return None
         known = good >= GOOD_SHARE * count
-        return Window(
-            t_us=self.t_us,
-            duration_s=count * step_s,
-            start_m=self.start_m,
-            end_m=end_m,
-            leg=self.key[1],
-            number=self.key[2],
-            speed_mps=nan if blind else self._speed_sum_mps / count,
-            samples=good,
-            clipped=self._clipped,
-            accel_rms_mps2=sqrt(self._accel_square / good) if known else nan,
-            a_w_mps2=sqrt(self._square / good) if known else nan,
-            mtvv_mps2=self._running_mps2 if known else nan,
-            vdv_mps175=(self._fourth * step_s) ** 0.25 if known else nan,
-            peak_mps2=self._peak_mps2 if known else nan,
-            flags=frozenset(self._flags(blind, complete)),
-        )
+        return Window(t_us=self.t_us, duration_s=count * step_s, start_m=self.start_m, end_m=end_m, leg=self.key[1],
+                      number=self.key[2], speed_mps=nan if blind else self._speed_sum_mps / count, samples=good,
+                      clipped=self._clipped, accel_rms_mps2=sqrt(self._accel_square / good) if known else nan,
+                      a_w_mps2=sqrt(self._square / good) if known else nan,
+                      mtvv_mps2=self._running_mps2 if known else nan,
+                      vdv_mps175=(self._fourth * step_s) ** 0.25 if known else nan,
+                      peak_mps2=self._peak_mps2 if known else nan, flags=frozenset(self._flags(blind, complete)))
 
     def _flags(self, blind: bool, complete: bool) -> list[str]:
         found = {

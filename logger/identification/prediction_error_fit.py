@@ -346,17 +346,15 @@ def _result(problem: _FitProblem, point: _Point, noise: Whitening, iterations: i
         [seen - one for seen, one in zip(problem.measured, problem.model.predict(at), strict=True)]
         for at in (start, values)
     )
-    return Fit(
-        free=problem.free, parameters=dict(zip(names, values.tolist(), strict=True)),
-        standard_errors=dict(zip(names, errors.tolist(), strict=True)), covariance=covariance,
-        correlation=covariance / np.maximum(np.outer(errors, errors), 1e-300),
-        error_before=normalised_rms(before, problem.measured),
-        error_after=normalised_rms(after, problem.measured), residuals=after,
-        white=np.split(point.white, np.cumsum([len(one) for one in point.plain])[:-1]),
-        sensitivities=slopes, low_pass=problem.low_pass, noise=noise, converged=settled,
-        iterations=iterations, cost=point.cost, at_bound=at_bound, ends=ends,
-        prior=(problem.precision, problem.pull(point.x)),
-    )
+    return Fit(free=problem.free, parameters=dict(zip(names, values.tolist(), strict=True)),
+               standard_errors=dict(zip(names, errors.tolist(), strict=True)), covariance=covariance,
+               correlation=covariance / np.maximum(np.outer(errors, errors), 1e-300),
+               error_before=normalised_rms(before, problem.measured),
+               error_after=normalised_rms(after, problem.measured), residuals=after,
+               white=np.split(point.white, np.cumsum([len(one) for one in point.plain])[:-1]),
+               sensitivities=slopes, low_pass=problem.low_pass, noise=noise, converged=settled,
+               iterations=iterations, cost=point.cost, at_bound=at_bound, ends=ends,
+               prior=(problem.precision, problem.pull(point.x)))
 
 
 def _covariance(problem: _FitProblem, point: _Point, slopes: Array) -> Array:

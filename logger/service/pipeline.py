@@ -331,37 +331,21 @@ class Pipeline(JudgedDrive):
         ride = comfort.ride
         crest = window.peak_mps2 / window.a_w_mps2 if window.a_w_mps2 > 0.0 else float("nan")
         self._segment += 1
-        return WindowRecord(
-            segment=self._segment,
-            drive=self.drive,
-            t_us=window.t_us,
-            utc_us=None if offset_us is None else window.t_us + offset_us,
-            duration_s=window.duration_s,
-            distance_start_m=window.start_m,
-            distance_end_m=window.end_m,
-            lat_deg=place[0] if place else None,
-            lon_deg=place[1] if place else None,
-            speed_mps=_known(window.speed_mps),
-            iri_m_per_km=iri,
-            iri_rms_m_per_km=self._iri_by_rms(window, flags),
-            a_w_mps2=_known(ride.a_w.value),
-            mtvv_mps2=_known(ride.mtvv.value),
-            vdv_mps175=_known(ride.vdv.value),
-            crest_factor=_known(crest),
-            comfort=comfort.word,
-            iri_class=iri_class(iri) if iri is not None else "",
-            accel_rms_mps2=_known(window.accel_rms_mps2),
-            samples=window.samples,
-            clipped_samples=window.clipped,
-            flags=tuple(sorted(flags)),
-            a_w_std_mps2=_known(ride.a_w.std),
-            mtvv_std_mps2=_known(ride.mtvv.std),
-            vdv_std_mps175=_known(ride.vdv.std),
-            a_w_raw_mps2=_known(window.a_w_mps2),
-            mtvv_raw_mps2=_known(window.mtvv_mps2),
-            vdv_raw_mps175=_known(window.vdv_mps175),
-            **_iri_errors(estimate, bool(flags & {"gps_lost", "gps_late"})),
-        )
+        return WindowRecord(segment=self._segment, drive=self.drive, t_us=window.t_us,
+                            utc_us=None if offset_us is None else window.t_us + offset_us, duration_s=window.duration_s,
+                            distance_start_m=window.start_m, distance_end_m=window.end_m,
+                            lat_deg=place[0] if place else None, lon_deg=place[1] if place else None,
+                            speed_mps=_known(window.speed_mps), iri_m_per_km=iri,
+                            iri_rms_m_per_km=self._iri_by_rms(window, flags), a_w_mps2=_known(ride.a_w.value),
+                            mtvv_mps2=_known(ride.mtvv.value), vdv_mps175=_known(ride.vdv.value),
+                            crest_factor=_known(crest), comfort=comfort.word,
+                            iri_class=iri_class(iri) if iri is not None else "",
+                            accel_rms_mps2=_known(window.accel_rms_mps2), samples=window.samples,
+                            clipped_samples=window.clipped, flags=tuple(sorted(flags)),
+                            a_w_std_mps2=_known(ride.a_w.std), mtvv_std_mps2=_known(ride.mtvv.std),
+                            vdv_std_mps175=_known(ride.vdv.std), a_w_raw_mps2=_known(window.a_w_mps2),
+                            mtvv_raw_mps2=_known(window.mtvv_mps2), vdv_raw_mps175=_known(window.vdv_mps175),
+                            **_iri_errors(estimate, bool(flags & {"gps_lost", "gps_late"})))
 
     def _iri_by_rms(self, window: Window, flags: set[str]) -> float | None:
         """IRI by the r.m.s. relation [m/km]; flags say why there is none."""

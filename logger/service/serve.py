@@ -42,11 +42,9 @@ RECENT_US = 15 * US_PER_S
 GRAVITY_TOLERANCE_G = 0.4
 LOOKS_WITHOUT_GRAVITY = 5
 UNREADABLE_S = 10.0
-_OTHER_UNITS = (
-    (STANDARD_GRAVITY_MPS2, "it seems to send m/s2, and is read as g. Choose the profile lines_mps2"),
-    (1 / STANDARD_GRAVITY_MPS2, "it seems to send g, and is read as m/s2. Choose the profile lines"),
-    (1000.0, "it seems to send thousandths of g, and is read as g. Have it send g"),
-)
+_OTHER_UNITS = ((STANDARD_GRAVITY_MPS2, "it seems to send m/s2, and is read as g. Choose the profile lines_mps2"),
+                (1 / STANDARD_GRAVITY_MPS2, "it seems to send g, and is read as m/s2. Choose the profile lines"),
+                (1000.0, "it seems to send thousandths of g, and is read as g. Have it send g"))
 """What gravity comes to in another unit than is read [g]."""
 log = logging.getLogger(__name__)
 

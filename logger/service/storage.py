@@ -86,18 +86,13 @@ class Storage:
 
     def status(self) -> StorageStatus:
         trouble = self.log.trouble
-        return StorageStatus(
-            trouble=trouble,
-            since_s=(self._now_us() - self.log.since_us) / US_PER_S if trouble else 0.0,
-            rows_waiting=self.log.waiting if trouble else 0,
-            rows_lost=self.log.rows_lost,
-            failures=self.log.failures,
-            recording_trouble=self._recording.trouble if self._recording is not None else "",
-            room_bytes=self._space.room_bytes,
-            exported_removed=self._space.exported_removed,
-            dumps_lost=self._space.dumps_lost,
-            notices=self._shown_notices(),
-        )
+        return StorageStatus(trouble=trouble,
+                             since_s=(self._now_us() - self.log.since_us) / US_PER_S if trouble else 0.0,
+                             rows_waiting=self.log.waiting if trouble else 0, rows_lost=self.log.rows_lost,
+                             failures=self.log.failures,
+                             recording_trouble=self._recording.trouble if self._recording is not None else "",
+                             room_bytes=self._space.room_bytes, exported_removed=self._space.exported_removed,
+                             dumps_lost=self._space.dumps_lost, notices=self._shown_notices())
 
     def _begin(self) -> SegmentLog:
         self._notices.clear()

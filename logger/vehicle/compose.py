@@ -220,11 +220,9 @@ def respond(car: Car, passage: Passage) -> Response:
     states, elevation = passage.sampled(motion.states), passage.sampled(elevation)
     coordinates, velocities = states[:, :n], states[:, n:]
     road_mps = np.gradient(elevation, 1 / passage.rate_hz, axis=0)
-    return Response(
-        car.written(passage, passage.recorded(accel, car.factor)),
-        coordinates @ structure.travel.T, velocities @ structure.travel.T,
-        coordinates @ structure.wheels.T - elevation, velocities @ structure.wheels.T - road_mps,
-    )
+    return Response(car.written(passage, passage.recorded(accel, car.factor)),
+                    coordinates @ structure.travel.T, velocities @ structure.travel.T,
+                    coordinates @ structure.wheels.T - elevation, velocities @ structure.wheels.T - road_mps)
 
 
 def bounded(records: Sequence[Array]) -> bool:

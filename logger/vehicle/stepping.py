@@ -224,11 +224,9 @@ def _tabulated(structure: Structure, laws: Sequence[CornerLaws], step_s: float) 
         damper = one.damper(rate) - one.damping_n_s_per_m * rate
         tables.append([_sum(one.springs, travel), damper, mount, _sum(one.tires, travel)])
         pairs.append(_pairs(one.others, paired))
-        numbers.append([
-            bool(one.springs), bool(damper.any()), mounted, bool(one.tires), bool(one.others),
-            one.mount_n_per_m if mounted else 0.0, low, 1 / step, one.damping_n_s_per_m, structure.tires[i],
-            one.tire_damping_n_s_per_m, np.inf if one.tire_pulls else loads[i],
-        ])
+        numbers.append([bool(one.springs), bool(damper.any()), mounted, bool(one.tires), bool(one.others),
+                        one.mount_n_per_m if mounted else 0.0, low, 1 / step, one.damping_n_s_per_m, structure.tires[i],
+                        one.tire_damping_n_s_per_m, np.inf if one.tire_pulls else loads[i]])
     return np.array(tables).swapaxes(0, 1).copy(), np.array(pairs), np.array(numbers, dtype=float)
 
 

@@ -254,21 +254,11 @@ def assemble(body_inertias: Sequence[float], corners: Sequence[Corner], contact_
     dampers = np.array([axle.suspension_damping_n_s_per_m for axle in axles])
     tires = np.array([axle.tire_stiffness_n_per_m for axle in axles])
     road = wheels.T * tires
-    return Structure(
-        mass=np.diag([*body_inertias, *(axle.unsprung_mass_kg for axle in axles)]),
-        damping=(travel.T * dampers) @ travel,
-        stiffness=(travel.T * springs) @ travel + road @ wheels,
-        road=road,
-        behind_m=places[0, 1] - places[:, 1],
-        left_m=places[:, 2],
-        contact_patch_m=contact_patch_m,
-        body=body,
-        wheels=wheels,
-        travel=travel,
-        springs=springs,
-        dampers=dampers,
-        tires=tires,
-    )
+    return Structure(mass=np.diag([*body_inertias, *(axle.unsprung_mass_kg for axle in axles)]),
+                     damping=(travel.T * dampers) @ travel, stiffness=(travel.T * springs) @ travel + road @ wheels,
+                     road=road, behind_m=places[0, 1] - places[:, 1], left_m=places[:, 2],
+                     contact_patch_m=contact_patch_m, body=body, wheels=wheels, travel=travel, springs=springs,
+                     dampers=dampers, tires=tires)
 
 
 AT_REST = np.empty(0)
@@ -402,13 +392,8 @@ def hung(structure: Structure, mass: float, stiffness: float, damping: float, at
     road = np.pad(structure.road, ((0, 1), (0, 0)))
     if structure.on_base:  # over which its place is counted
         road[-1, BASE_INPUTS.index("acceleration")] = -mass * attached.sum()
-    return replace(
-        structure,
-        mass=np.pad(structure.mass, (0, 1)) + np.diag(np.append(np.zeros(n), mass)),
-        damping=with_newcomer(structure.damping, structure.dampers, damping),
-        stiffness=with_newcomer(structure.stiffness, structure.springs, stiffness),
-        road=road,
-        body=np.pad(structure.body, ((0, 1), (0, 0))),
-        wheels=np.pad(structure.wheels, ((0, 0), (0, 1))),
-        travel=wider,
-    )
+    return replace(structure, mass=np.pad(structure.mass, (0, 1)) + np.diag(np.append(np.zeros(n), mass)),
+                   damping=with_newcomer(structure.damping, structure.dampers, damping),
+                   stiffness=with_newcomer(structure.stiffness, structure.springs, stiffness), road=road,
+                   body=np.pad(structure.body, ((0, 1), (0, 0))), wheels=np.pad(structure.wheels, ((0, 0), (0, 1))),
+                   travel=wider)
