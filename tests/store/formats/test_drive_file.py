@@ -110,7 +110,7 @@ def test_speeds(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(("text", "complaint"), [
     ("t_s\n0\n1", ":1: expected a header with t_s,speed_mps, each once"),
-    ("t_s,speed_mps\n0,1", ":3: expected at least two times"),
+    ("t_s,speed_mps\n0,1", ":3: expected at least two samples"),
     ("t_s,speed_mps\n0,1\n1,1\n1,2", ":4: expected a time after 1 s, found 1"),
     ("t_s,speed_mps\n0,1\n1,-1\n", ":3: expected a speed of 0 or more, found -1"),
     ("t_s,speed_mps\n0,1\n1,151\n", ":3: expected speed_mps within 150 m/s, found 151"),
