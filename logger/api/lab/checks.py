@@ -25,7 +25,7 @@ from logger.errors import BadInput
 from logger.lab.another_car import AnotherCar, LikeliestRig, another_car, error_with_best_effect, likeliest_rig
 from logger.lab.likelihood.lag import SLOWEST_MPS
 from logger.lab.likelihood.priors import Tolerance
-from logger.lab.likelihood.whittle import HIGHEST_OF_RATE, LOWEST_HZ
+from logger.lab.likelihood.whittle import BLOCK_S, HIGHEST_OF_RATE, LOWEST_HZ
 from logger.lab.residuals.breakdown import ModelResiduals
 from logger.lab.residuals.road_coherence import coherence_with_road
 from logger.lab.road_match import (
@@ -552,13 +552,15 @@ def _more(drive: Drive, part: slice) -> Array:
 
 
 def thinned_runs(runs: Sequence[Run], vehicle: Vehicle | None = None) -> list[Run]:
-    """Runs of one rate, of about 100 samples a second, or as many as the ``vehicle`` needs, if they had many more. What
-    is thinned is no longer rounded; a sample is as usable as the least of those beside it.
+    """Runs of one rate, of about 100 samples a second, or as many as the ``vehicle`` or the band of a rig's readings
+    needs, if they had many more. What is thinned is no longer rounded; a sample is as usable as the least of those
+    beside it.
 
     Little of a car's motion lies where the recorder's filter begins; what jerks a rig of little mass is there as well,
     so that its record goes through the filter that its model goes through.
     """
-    factor = int(runs[0].rate_hz / _needed_hz(vehicle) + _NEARLY)
+    needed_hz = max(_needed_hz(vehicle), *(occupied_hz(one) / HIGHEST_OF_RATE for one in runs if one.timed), 0.0)
+    factor = int(runs[0].rate_hz / needed_hz + _NEARLY)
     if factor < 2:
         return list(runs)
 
@@ -570,6 +572,18 @@ def thinned_runs(runs: Sequence[Run], vehicle: Vehicle | None = None) -> list[Ru
                     facts=replace(one.facts, step_mps2=None), usable=_thinned_marks(one.usable, factor),
                     more=np.array([fewer(one, samples) for samples in one.more]) if one.signals else one.more)
             for one in runs]
+
+
+def occupied_hz(run: Run) -> float:
+    """The bandwidth that a run's readings occupy: what lies above it has less than a per cent of their power (ITU-R
+    SM.328), that of the quietest of 20 bands taken for noise. A part of a rig that its model lacks may swing above all
+    that the model has."""
+    from scipy.signal import welch
+
+    f_hz, density = welch(run.measured_mps2, run.rate_hz, nperseg=min(run.count, int(BLOCK_S * run.rate_hz)))
+    noise = min(band.mean() for band in np.array_split(density, 20))
+    power = np.cumsum(density - noise)
+    return float(f_hz[np.argmax(power >= 0.99 * power[-1])])
 
 
 def _thinned_marks(usable: Array | None, factor: int) -> Array | None:
