@@ -224,7 +224,7 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
         search, selection = search_effects(posterior, effects, present, progress)
     found = assess(posterior, effects, present, search, selection)
     tried = {name: one for name, one in last.items() if name not in obstacles_of(posterior, last, present)}
-    if not (found.exceeds_noise and tried):
+    if not (tried and (found.exceeds_noise or found.within_calibration)):
         return found
     progress(f"something is left unexplained: searching with {' and '.join(tried)}, too")
     search, selection = search.with_more(selection, [*tried.values()])
