@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import cached_property
 
 import numpy as np
 
@@ -31,7 +32,8 @@ SLOWEST_MPS = 0.5
 LATE_WITHIN_S = 0.3
 """How late the road is felt is looked for so far from window to window: above what receivers are late by, below half a
 bounce of a body."""
-
+_FIRST_RISES, _AT_REST = 5, 0.1
+"""So many rises from sample to sample are a beginning; at rest they are less than a tenth of the usual (judgements)."""
 
 _UNITS = {"acceleration": "m/s2", "velocity": "m/s", "displacement": "m", "travel": "m", "force": "N",
           "pitch_rate": "rad/s", "roll_rate": "rad/s"}
@@ -309,6 +311,15 @@ class Run:
         """What nobody recorded of it."""
         return past_of(self.track)
 
+    @cached_property
+    def begins_in_motion(self) -> bool:
+        """Whether it is a rig's that does not begin at rest: from its first samples on it moves as it does later. So
+        does one that is shaken hard from there on."""
+        if not self.timed:
+            return False
+        rises = np.diff(np.stack([self.measured_mps2, *self.more]))
+        return bool((rises[:, :_FIRST_RISES].std(axis=1) > _AT_REST * rises.std(axis=1)).any())
+
     @property
     def at_rest(self) -> bool:
         """Whether what the rig stands on rests, so that forces alone drive it."""
@@ -323,7 +334,7 @@ def are_on_rig(runs: Sequence[Run]) -> bool:
 class Past(Enum):
     """What was before a run's first sample, and by its value how much of the run's beginning is left out for it [s].
 
-    DRIVEN     a road or a rig moved the car, whose state at the first sample fades away
+    DRIVEN     a road or a rig moved the car, whose state at the first sample fades away, or is found with the rest
     OF_PART    a bench moved the ends of a part: it remembers no more than a damper on its mount does (2 kN s/m on
                2e5 N/m: 10 ms; a judgement), and what its laws remember is found with the rest
     FREE       nothing drives it from there on: the state in which it begins is found with the rest

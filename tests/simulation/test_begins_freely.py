@@ -1,9 +1,10 @@
-"""Runs that nothing drives: the state that they begin in is found, against closed solutions and an integrator of
-scipy's."""
+"""Runs that nothing drives, or that ring as their record begins: the state that they begin in is found, against closed
+solutions, an integrator of scipy's, and the whole motion."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import numpy.typing as npt
@@ -130,3 +131,24 @@ def test_a_memory_of_which_its_record_shows_nothing_stays_at_rest() -> None:
     stiffer = compose(Vehicle("other", "component", 0.0, None, Axle(0.0, 0.0, 0.0, 1530.0, 0.0), None, 0.0), (memory,))
     (before,), (alone,), (near,) = runs.predict(car), runs.predict(stiffer), runs.predict(stiffer, near=[begins])
     assert (near - before)[50:] == pytest.approx((alone - before)[50:], abs=1e-3 * np.ptp(alone - before))
+
+
+@pytest.mark.parametrize("measures", SIGNALS)
+def test_a_driven_record_begins_in_the_ringing_of_before(measures: str) -> None:
+    """Cut from a longer one of a mass that rings for 5 s: both are the same motion; of one that does not ring, too."""
+    shaken = Excitation(RATE_HZ, 0.002 * np.random.default_rng(3).standard_normal(1200))
+    whole = Run("whole", RATE_HZ, *np.zeros((3, 1200)), shaken, facts=RecordFacts(main=SIGNALS[measures]))
+    for damping in (0.3, 10 * C):
+        ringing = Vehicle("ringing", "single_mass", M, None, Axle(0.0, 0.0, K, damping, 0.0), None, 0.0)
+        (motion,) = SimulatedRuns([whole]).predict(compose(ringing))
+        later = replace(whole.part(slice(400, None)), track=shaken.begun(4.0))
+        later = replace(later, measured_mps2=motion[400:] - motion[400:].mean())
+        (found,) = SimulatedRuns([later]).predict(compose(ringing))
+        off = later.residual(found)[later.first:]
+        assert off.std() < 2e-3 * motion.std()
+
+
+def test_what_hardly_moves_at_its_first_samples_begins_at_rest() -> None:
+    rising = TIME_S * np.sin(20 * TIME_S)
+    shaken = replace(run_of("displacement", rising), track=Excitation(RATE_HZ, rising), skip_s=1.0)
+    assert not shaken.begins_in_motion and replace(shaken, measured_mps2=rising[::-1]).begins_in_motion
