@@ -104,11 +104,11 @@ def test_beside_something_unexplained_it_is_only_part_or_an_imitation() -> None:
 def test_what_calibrated_sensors_may_leave_above_their_noise_is_said_too() -> None:
     missing, left, *_ = diagnosis_summary(replace(FOUND, over_noise=0.5))
     assert missing.startswith("dry_friction is missing")
-    assert left == ("Something more may be missing that no known effect explains: in the worst run the residual is 1.5 "
-                    "times the sensor's noise. Beyond that noise it is less than 0.1% of the measured power, no "
-                    "more than calibration errors cause.")
-    nothing, *_ = diagnosis_summary(replace(NOTHING, over_noise=0.5))
+    assert left == ("In the worst run the residual is 1.5 times the sensor's noise. Beyond that noise it is less than "
+                    "0.1% of the measured power: calibration errors of the sensors may leave as much.")
+    nothing, as_much, *_ = diagnosis_summary(replace(NOTHING, over_noise=0.5))
     assert nothing.endswith("the residual is hardly more than calibration errors of the sensors.")
+    assert as_much == left
 
 
 def test_what_no_candidate_explains_is_said_and_so_are_imitations_that_are_not_named() -> None:

@@ -339,7 +339,8 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
         lines.append("The sensor's noise is coloured (louder at some frequencies). It is equally loud at small and at "
                      "large motion, so the motion does not cause it.")
     if found.exceeds_noise:
-        lines.append(_left_over(found, "is", found.excess) + ".")
+        lines.append(f"Something {'more ' * bool(found.missing)}is missing that no known effect explains: in the worst "
+                     f"run the residual is {_left_over(found, found.excess)}.")
         if found.contradicted_by:
             lines.append(f"It appears only in {enumerated(found.contradicted_by, 'and')}; the model explains the other "
                          "signals down to their noise. Check that sensor: its place, its sign, its filter.")
@@ -347,7 +348,8 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
             lines.append(f"ridelog names no effect that gains less than {IMITATION:.0%} of what a full explanation "
                          "would: it may only imitate what is missing.")
     elif found.within_calibration:
-        lines.append(_left_over(found, "may be", found.over_noise) + ", no more than calibration errors cause.")
+        lines.append(f"In the worst run the residual is {_left_over(found, found.over_noise)}: calibration errors of "
+                     "the sensors may leave as much.")
     lines += [f"{name} is {share:+.1%} off against all other signals, more than a calibration error: check its scale "
               "and its unit. The search for effects corrected it."
               for name, share in found.signals_off.items()]
@@ -365,11 +367,9 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
     return lines
 
 
-def _left_over(found: LabDiagnosis, how: str, over: float) -> str:
+def _left_over(found: LabDiagnosis, over: float) -> str:
     left = percent(max(found.final_error**2 - found.noise_floor_error**2, 0.0))
-    return (f"Something {'more ' * bool(found.missing)}{how} missing that no known effect explains: in the worst run "
-            f"the residual is {1 + over:.3g} times the sensor's noise. Beyond that noise it is {left} of the measured "
-            "power")
+    return f"{1 + over:.3g} times the sensor's noise. Beyond that noise it is {left} of the measured power"
 
 
 def _explained_power(found: LabDiagnosis) -> str:
