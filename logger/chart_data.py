@@ -49,7 +49,8 @@ def line(name: str, x: Array, y: Array) -> Line:
 
 @dataclass(frozen=True, eq=False)
 class Curves:
-    """A chart of lines; ``level``: a value that has a name, drawn across; on logarithmic axes values are above 0."""
+    """A chart of lines; ``level``: a value that has a name, drawn across; on logarithmic axes values are above 0;
+    ``equal``: a unit is as long on both axes, as on a map."""
 
     title: str
     x_name: str
@@ -58,6 +59,7 @@ class Curves:
     level: tuple[float, str] | None = None
     log_x: bool = False
     log_y: bool = False
+    equal: bool = False
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,6 +5,10 @@ from __future__ import annotations
 from math import cos, hypot, radians
 from typing import Protocol
 
+import numpy as np
+
+from logger.arrays import Array
+
 EARTH_RADIUS_M = 6_371_008.8
 """Mean radius of the Earth, (2 a + b) / 3 of its ellipsoid (IUGG; H. Moritz, Geodetic Reference System 1980)."""
 
@@ -37,7 +41,7 @@ def apart_m(one: Placed, other: Placed) -> float | None:
     return ground_distance_m(one.lat_deg, one.lon_deg, other.lat_deg, other.lon_deg)
 
 
-def east_and_north_m(lat_deg: float, lon_deg: float, lat0_deg: float, lon0_deg: float) -> tuple[float, float]:
-    """How far east and north of a near place 0 another one lies [m]."""
-    return (EARTH_RADIUS_M * radians(east_deg(lon0_deg, lon_deg)) * cos(radians(lat0_deg)),
-            EARTH_RADIUS_M * radians(lat_deg - lat0_deg))
+def east_and_north_m(lat_deg: Array, lon_deg: Array, lat0_deg: float, lon0_deg: float) -> tuple[Array, Array]:
+    """How far east and north of a near place 0 others (n,) lie [m], (n,) each."""
+    return (EARTH_RADIUS_M * np.radians((lon_deg - lon0_deg + 180.0) % 360.0 - 180.0) * cos(radians(lat0_deg)),
+            EARTH_RADIUS_M * np.radians(lat_deg - lat0_deg))

@@ -93,16 +93,10 @@ def recorded_dump(dump: Path, given: Config | None, vehicle: str | None, tell: T
 
 
 def _facts(sensor: Instrument, config: Config) -> RecordFacts:
-    range_g = sensor.description.get("range_g")
-    return RecordFacts(step_mps2=sensor.on_grid(sensor.sensor.noise_rms_mps2).step_mps2 or None,
-                       range_mps2=range_g and range_g * STANDARD_GRAVITY_MPS2, noise_mps2=_noise_mps2(sensor, config))
-
-
-def _noise_mps2(sensor: Instrument, config: Config) -> float | None:
-    """Of the sensor, where the settings say it; None: whoever reads the run learns it from the readings."""
-    if not isinstance(config.accelerometer.noise_mps2, float):
-        return None
-    return sensor.on_grid(sensor.sensor.noise_rms_mps2).noise_rms_mps2
+    range_g, reading = sensor.description.get("range_g"), sensor.on_grid(sensor.sensor.noise_rms_mps2)
+    is_said = isinstance(config.accelerometer.noise_mps2, float)  # else whoever reads the run learns it
+    return RecordFacts(step_mps2=reading.step_mps2 or None, range_mps2=range_g and range_g * STANDARD_GRAVITY_MPS2,
+                       noise_mps2=reading.noise_rms_mps2 if is_said else None)
 
 
 class _NoRows:
@@ -281,8 +275,6 @@ def write_runs(recorded: Recorded, source: Path, name: str, out: Path, measured:
 
     Raises BadInput where there are none, with the reason, and for a folder that holds the run of something else.
     """
-    if out.exists() and not out.is_dir():
-        raise BadInput(f"{out}: expected a folder")
     tell("cutting it into runs")
     drives, left_out = _drives(recorded, measured)
     if not drives:

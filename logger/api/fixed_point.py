@@ -7,7 +7,6 @@ function, as C's own round towards zero and its shifts of negative numbers are l
 shift of a division by 2^30. Names carry the filter's, so that headers stand side by side.
 """
 
-from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from string import Template
@@ -81,7 +80,12 @@ class _Header:
     def text(self) -> str:
         from logger.shipped import version
 
-        return c_header(self.name, self.title, self.unit, self.notes, self.cascade, version())
+        cascade = self.cascade
+        return _HEADER.substitute(
+            name=self.name, macro=self.name.upper(), title=self.title, unit=self.unit,
+            notes="".join(f" * {note}\n" for note in self.notes), version=version(), count=len(cascade.sections),
+            bits=cascade.data_bits, largest=cascade.largest_input, input_step=repr(cascade.input_step),
+            output_step=repr(cascade.output_step), rows="\n".join(map(_row, cascade.sections)))
 
     def as_json(self, folder: Path) -> dict[str, Any]:
         return {
@@ -223,24 +227,6 @@ static inline int${bits}_t ${name}_step(${name}_state *state, int${bits}_t x)
 
 #endif
 """)
-
-
-def c_header(name: str, title: str, unit: str, notes: Sequence[str], cascade: "FixedCascade", version: str) -> str:
-    """Text of the header; ``name`` is the C prefix (lower case), ``unit`` that of inputs and outputs."""
-    return _HEADER.substitute(
-        name=name,
-        macro=name.upper(),
-        title=title,
-        unit=unit,
-        notes="".join(f" * {note}\n" for note in notes),
-        version=version,
-        count=len(cascade.sections),
-        bits=cascade.data_bits,
-        largest=cascade.largest_input,
-        input_step=repr(cascade.input_step),
-        output_step=repr(cascade.output_step),
-        rows="\n".join(map(_row, cascade.sections)),
-    )
 
 
 def _row(section: "FixedSection") -> str:

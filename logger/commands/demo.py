@@ -398,19 +398,22 @@ def _judged(folder: Path, vehicle: str, title: str, why: str, commands: _Command
 def _write_page(file: Path, out: Path, story: Story, before: Assessment, after: Assessment, sentence: str) -> None:
     from logger.api.extraction import RATE_HZ
     from logger.api.lab.loop import field_page
-    from logger.report.maps import MapLine
+    from logger.chart_data import Curves, Line
+    from logger.geodesy import east_and_north_m
     from logger.store.formats.drive_file import DRIVE, PLACE, read_columns
     from logger.store.formats.profile_file import read_places
 
-    measured = [MapLine(name, *read_places(out / name)[1:]) for name in (LINE, BEYOND)]
-    driven = []
-    for name in (*DRIVES, FOURTH):
+    drives = (*DRIVES, FOURTH)
+    places = {name: read_places(out / name)[1:] for name in (LINE, BEYOND)}
+    for name in drives:
         _, columns = read_columns(out / RUNS / name / DRIVE)
-        lat_deg, lon_deg = (columns[one][::round(RATE_HZ)] for one in PLACE)
-        driven.append(MapLine(name, lat_deg, lon_deg))
-    write_text(file, field_page(f"{FIELD.vehicle}: four drives, and what was missing", _ABOUT, measured, driven, story,
-                                before,
-                          after, [sentence.partition(" Difference")[0]]))
+        places[name] = columns[PLACE[0]], columns[PLACE[1]]
+    begin_deg = [float(one[0]) for one in places[LINE]]
+    ways = Curves("The drives", "east [m]", "north [m]", tuple(
+        Line(name, *east_and_north_m(*(one[::round(RATE_HZ)] for one in place), *begin_deg), dots=name in drives)
+        for name, place in places.items()), equal=True)
+    write_text(file, field_page(f"{FIELD.vehicle}: four drives, and what was missing", _ABOUT, ways, story, before,
+                                after, [sentence.partition(" Difference")[0]]))
 
 
 def _ending(story: Story, before: Assessment, after: Assessment, page: Path) -> list[str]:

@@ -12,8 +12,7 @@ from logger.files import write_file
 from logger.left_out import left_out_json, left_out_lines
 from logger.printable import counted
 from logger.question import Answer, Argument, Option, Question, Verb
-from logger.report.maps import MapLine
-from logger.report.page import notices, page
+from logger.report.page import MapLine, notices, page
 from logger.report.placed import of_files
 from logger.report.summary import summarise, summary_json
 from logger.store.formats.road_lines import read_road_lines

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from logger.errors import BadInput
 from logger.files import make_folder, together, write_text
-from logger.question import Answer, Argument, Checked, Option, Question, Verb
+from logger.question import Answer, Argument, Checked, LongQuestion, Option, Verb
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
@@ -19,11 +19,10 @@ if TYPE_CHECKING:
 QUICK_SHARE = 0.1
 SHELF_NAMES = ("dissertation", "field", "roads")
 _WIDTH, _NARROWEST = 118, 24
-_BAR = 30
 
 
 @dataclass(frozen=True, kw_only=True)
-class StudyQuestion(Question):
+class StudyQuestion(LongQuestion):
     """Reproduce a table or a figure of the reference dissertation, or of other papers, with its printed values.
 
       ridelog study --list
@@ -91,8 +90,8 @@ def _one(study: "Study", asked: StudyQuestion) -> Answer:
     if not study.data and asked.vehicle is not None:
         raise BadInput(f"study {study.called}: expected no --vehicle, found {asked.vehicle}")
     check_outs([("--out", asked.out)])
-    show = show_progress if sys.stderr.isatty() else lambda _done, _of: None
-    result = study.run(Workload(asked.share, show, asked.folder, asked.vehicle))
+    result = study.run(Workload(asked.share, lambda done, of: asked.progress(f"{done} of {of}"), asked.folder,
+                                asked.vehicle))
     if asked.out is not None:
         from logger.report.study_page import page
 
@@ -129,13 +128,6 @@ def _all(known: list["Study"], asked: StudyQuestion) -> Answer:
          "failure": carried[one.called].failure or None} for one in chosen]}
     return Checked(f"{len(chosen)} studies, {len(failed)} contradict their stated verdicts. "
                    f"Page: {asked.out / 'index.html'}", said, not failed)
-
-
-def show_progress(done: int, of: int) -> None:
-    """Show a bar with ``done`` parts of so many, on one line that is wiped at the end."""
-    bar = "#" * (_BAR * done // of)
-    print(f"\r[{bar:{_BAR}}] {done} of {of}" if done < of else "\r" + " " * (_BAR + 30) + "\r", end="", file=sys.stderr,
-          flush=True)
 
 
 def _list(known: list["Study"]) -> Iterator[str]:

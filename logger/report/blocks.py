@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from logger.chart_data import Bars, Chart, Curves, Field
 from logger.report import document as doc
-from logger.report.charts import Steps, chart
+from logger.report.charts import chart
 from logger.report.quantities import UNITS, DisplayUnits, columns, known, wrapped
 from logger.units import INCH_PER_MILE_M_PER_KM
 
@@ -77,7 +77,7 @@ class Detail(Section):
     """A section of a page alone."""
 
 
-Block = str | doc.Html | Lines | Bullets | Hint | Table | Section | Chart | Steps
+Block = str | doc.Html | Lines | Bullets | Hint | Table | Section | Chart
 """A ``str`` that is no HTML is a sentence, or some."""
 
 
@@ -105,7 +105,7 @@ def _joined(rendered: Iterable[tuple[Block, str]]) -> str:
 
 
 def _lines(one: Block) -> str:
-    if isinstance(one, doc.Html | Steps | Curves | Bars | Field | Detail):
+    if isinstance(one, doc.Html | Curves | Bars | Field | Detail):
         return ""
     if isinstance(one, str):
         return wrapped([one])

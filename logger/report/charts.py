@@ -1,4 +1,4 @@
-"""Charts as SVG text, all in one style: lines over an axis, shades over a grid, bars, falling steps; and as files.
+"""Charts as SVG text, all in one style: lines over an axis, shades over a grid, bars; and as files.
 
 A chart is drawn in units of about one pixel on a desk's screen and scales with the page. Colours are not in it: they
 are classes that the page's style sheet fills in, so that one chart reads on light and on dark ground. Pages need no
@@ -13,7 +13,6 @@ from io import BytesIO
 from itertools import pairwise
 from math import ceil, floor, log10
 from pathlib import Path
-from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -53,7 +52,6 @@ class _Box:
 
 
 _CHART = _Box(height=420, left=64, right=170, top=20, bottom=44)
-_STEPS = _Box(height=300, left=64, right=110, top=26, bottom=62)
 
 
 @dataclass(frozen=True)
@@ -139,9 +137,7 @@ def nice_step(least: float) -> float:
 # --- lines over an axis, shades over a grid ---
 
 
-def chart(one: Chart | Steps) -> Html:
-    if isinstance(one, Steps):
-        return steps_figure(one)
+def chart(one: Chart) -> Html:
     if isinstance(one, Bars):
         return _bars(one)
     return _figure(_CHART, one.title, _field(one) if isinstance(one, Field) else _curves(one))
@@ -172,7 +168,13 @@ def _curves(one: Curves) -> list[Html]:
     level = None if one.level is None else (log10(one.level[0]) if one.log_y else one.level[0])
     ys = [edge for shape in shapes for edge in (shape.y, shape.low, shape.high)]
     ys += [] if level is None else [np.array([level])]
-    frame = _Frame(_CHART, *_ends(np.concatenate([shape.x for shape in shapes])), *_ends(np.concatenate(ys)))
+    ends = [_ends(np.concatenate([shape.x for shape in shapes])), _ends(np.concatenate(ys))]
+    if one.equal:
+        pixels = (_CHART.right_px - _CHART.left, _CHART.bottom_px - _CHART.top)
+        pixel = max((high - low) / count for (low, high), count in zip(ends, pixels, strict=True))
+        ends = [((low + high - pixel * count) / 2, (low + high + pixel * count) / 2)
+                for (low, high), count in zip(ends, pixels, strict=True)]
+    frame = _Frame(_CHART, *ends[0], *ends[1])
     parts = _axes(frame, one.x_name, one.y_name, one.log_x, one.log_y)
     if one.level is not None and level is not None:
         parts += [frame.across("level", level), frame.beside(level, one.level[1])]
@@ -284,41 +286,6 @@ def _axes(frame: _Frame, x_name: str, y_name: str, log_x: bool = False, log_y: b
             _words(box.right_px, box.height - 6, x_name, "end"), _words(box.left, box.top - 6, y_name)]
 
 
-# --- falling steps ---
-
-
-@dataclass(frozen=True)
-class Steps:
-    """Words and a value (0 or more) per step, at least one; ``level``: a value with a name, drawn across."""
-
-    title: str
-    unit: str
-    values: tuple[tuple[str, float], ...]
-    level: tuple[float, str] | None = None
-
-
-def steps_figure(one: Steps) -> Html:
-    """The figure element of a number that falls from step to step: a point and words for each."""
-    top = 1.1 * (max([value for _, value in one.values] + ([one.level[0]] if one.level else [])) or 1.0)
-    count = len(one.values)
-    frame = _Frame(_STEPS, 0.0, count, 0.0, max(top, nice_ticks(0.0, top, 5)[-1]))
-    parts = [frame.rows(5)]
-    if one.level is not None:
-        parts.append(html('<path class="thick s3" d="M{} {:.1f}H{}" stroke-dasharray="6 5"/>', _STEPS.left,
-                          frame.y(one.level[0]), _STEPS.right_px) + frame.beside(*one.level))
-    points = [(index + 0.5, value) for index, (_, value) in enumerate(one.values)]
-    if count > 1:
-        parts.append(html('<path class="thick s0" d="M{}"/>', " ".join(frame.points(points))))
-    line_px, most_lines = 15, 3
-    letters = max(8, int((_STEPS.right_px - _STEPS.left) / count / _LETTER_PX))
-    for (at, value), (words, _) in zip(points, one.values, strict=True):
-        x, y = frame.x(at), frame.y(value)
-        parts += [_dot(x, y, 5, 0), _words(x, y - 10, f"{value:.3f}", "middle")]
-        parts += [_words(x, _STEPS.bottom_px + 18 + line_px * number, line, "middle")
-                  for number, line in enumerate(wrap(words, letters)[:most_lines])]
-    return _figure(_STEPS, one.title, [*parts, _words(_STEPS.left, _STEPS.top - 10, one.unit)], "plot named")
-
-
 _LINE_COLOURS = tuple(CLASS_COLOURS[number] for number in SERIES)
 
 
@@ -381,6 +348,7 @@ def _draw_curves(axes: Any, one: Curves) -> None:
                       color="0.4", fontsize=8)
     axes.set_xscale("log" if one.log_x else "linear")
     axes.set_yscale("log" if one.log_y else "linear")
+    axes.set_aspect("equal" if one.equal else "auto", "datalim")
     axes.grid(alpha=0.25)
     if len(series) > 1:
         axes.legend(frameon=False, fontsize=8)

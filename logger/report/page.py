@@ -16,6 +16,7 @@ import json
 import zlib
 from base64 import b64encode
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import chain
 from math import isfinite
 from typing import Any
@@ -29,7 +30,6 @@ from logger.comfort.iso2631 import COMFORT_WORDS
 from logger.printable import counted
 from logger.records import WindowRecord
 from logger.report import document as doc
-from logger.report.maps import MapLine
 from logger.report.placed import MOST_ROWS, PlacesPassed, places_passed
 from logger.report.summary import (
     COMFORT_NAMES,
@@ -75,6 +75,15 @@ FLAG_MEANINGS: Mapping[str, str] = {
     "faint": "the sensor hardly sees this road at this speed",
     "blind": "no speed: a window by time, without distance",
 }
+
+
+@dataclass(frozen=True, eq=False)
+class MapLine:
+    """A line on the ground: latitudes and longitudes (n,) [degrees]."""
+
+    name: str
+    lat_deg: Array
+    lon_deg: Array
 
 
 def page(files: Sequence[LoggedFile], base: Sequence[MapLine] = (), base_name: str = "", tiles_from: str = "",

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from logger.commands.main import main
-from logger.commands.study import show_progress
+from logger.commands.options import progress
 from logger.errors import BadInput
 from logger.studies.study import studies
 
@@ -96,10 +96,10 @@ def test_wrong_use(arguments: list[str], complaint: str) -> None:
         main(["study", *arguments])
 
 
-def test_progress_wipes_itself(capsys: pytest.CaptureFixture[str]) -> None:
-    for done in range(3):
-        show_progress(done, 2)
+def test_progress_wipes_itself(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True)
+    with progress() as tell:
+        tell("0 of 2")
+        tell("1 of 2")
     shown = capsys.readouterr().err.split("\r")
-    assert shown[1].startswith("[" + " " * 30 + "] 0 of 2")
-    assert shown[2].startswith("[" + "#" * 15)
-    assert shown[3].strip() == ""
+    assert [one.strip() for one in shown] == ["", "0 of 2", "1 of 2", "", ""]

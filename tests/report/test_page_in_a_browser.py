@@ -15,8 +15,7 @@ import pytest
 
 from logger.geodesy import ground_distance_m
 from logger.records import WindowRecord
-from logger.report.maps import MapLine
-from logger.report.page import page
+from logger.report.page import MapLine, page
 from logger.report.summary import summarise
 from logger.store.log.log_reader import LoggedFile
 

@@ -50,7 +50,7 @@ def test_a_study_runs_and_is_whole(name: str) -> None:
     if name.split("-")[0] in ("fig", "table"):
         assert study.where.split()[1].rstrip(",") == ".".join(name.split("-")[1:])
     assert not study.differs(result)
-    assert result.tables
+    assert result.all_tables
     for table in result.all_tables:
         assert table.rows, table.title
         for row in table.rows:

@@ -11,7 +11,7 @@ import pytest
 from logger.chart_data import Field
 from logger.estimation.rms_calibration import rms_relation
 from logger.roads.iri import iri
-from logger.studies.dissertation import chapter_5, chapter_6_roads
+from logger.studies.dissertation import chapter_5, chapter_6
 from logger.studies.drives import (
     PS_2119,
     Conditions,
@@ -75,12 +75,12 @@ def test_shares_of_comfort() -> None:
 
 
 def test_speeds_of_the_segments_are_those_of_table_d_1() -> None:
-    mph = [chapter_6_roads.PRINTED_MPH[segment] for segment in range(1, 38)]
-    assert len(chapter_6_roads.PRINTED_MPH) == 37
+    mph = [chapter_6.PRINTED_MPH[segment] for segment in range(1, 38)]
+    assert len(chapter_6.PRINTED_MPH) == 37
     assert mph[:10] == [30, 30, 30, 30, 25, 20, 20, 25, 25, 20]
     assert mph[20:24] == [20, 15, 20, 20]
     assert [mph.count(speed) for speed in (30, 25, 20, 15)] == [4, 3, 29, 1]
-    assert chapter_6_roads.PRINTED_KMH == {30: 48.28, 25: 40.23, 20: 32.19, 15: 24.14}
+    assert chapter_6.PRINTED_KMH == {30: 48.28, 25: 40.23, 20: 32.19, 15: 24.14}
 
 
 def test_the_sizes_that_are_asked_for_give_the_printed_words() -> None:

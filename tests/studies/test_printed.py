@@ -7,14 +7,14 @@ import pytest
 
 from logger.chart_data import Field
 from logger.modal import five_storey
-from logger.studies.dissertation import chapter_4_bumps, chapter_4_roads, chapter_5, chapter_6_bodies
+from logger.studies.dissertation import chapter_4, chapter_5, chapter_6
 from logger.studies.drives import BUMP_MPS, Conditions, bump, record_of, until, without_profile
 
 from ..support.study_results import study_result
 
 
 def test_the_tables_of_25_starts() -> None:
-    printed = [np.array(table) for table in chapter_4_bumps.PRINTED_PERCENT.values()]
+    printed = [np.array(table) for table in chapter_4.PRINTED_PERCENT.values()]
     assert [one.shape for one in printed] == [(5, 5)] * 3
     assert [one[0, 1] for one in printed] == [2.04, 1.29, 1.67]
     assert [one[4, 4] for one in printed] == [2.40, 0.18, 0.33]
@@ -33,16 +33,16 @@ def test_all_starts_end_alike() -> None:
 
 
 def test_printed_errors_are_those_of_the_printed_masses() -> None:
-    bumps = zip(np.ravel(chapter_6_bodies.PRINTED_KG), np.ravel(chapter_6_bodies.PRINTED_PERCENT), strict=True)
-    bridges = [pair for _, *row in chapter_6_bodies.PRINTED_T6_3 for pair in (row[:2], row[2:])]
+    bumps = zip(np.ravel(chapter_6.PRINTED_KG), np.ravel(chapter_6.PRINTED_PERCENT), strict=True)
+    bridges = [pair for _, *row in chapter_6.PRINTED_T6_3 for pair in (row[:2], row[2:])]
     pairs = [*bumps, *bridges]
     assert len(pairs) == 16
     assert [percent for _, percent in pairs] == pytest.approx([100 * abs(kg / 875 - 1) for kg, _ in pairs], abs=0.01)
 
 
 def test_other_printed_values() -> None:
-    assert [limit for *_, limit in chapter_4_roads.PRINTED_T4_3] == pytest.approx(
-        [0.5386 * gd**0.5 for _, gd, _ in chapter_4_roads.PRINTED_T4_3], abs=0.01)
+    assert [limit for *_, limit in chapter_4.PRINTED_T4_3] == pytest.approx(
+        [0.5386 * gd**0.5 for _, gd, _ in chapter_4.PRINTED_T4_3], abs=0.01)
     measured, model = (np.array(one) for one in (five_storey.PRINTED_MEASURED_HZ, five_storey.PRINTED_MODEL_HZ))
     printed = chapter_5.PRINTED_ERROR_PERCENT
     # 1.88 % is 2.548 to 2.500 over 2.548; 7.29 % is over the measured value, too.

@@ -15,7 +15,7 @@ import numpy as np
 from logger.api.road_sets import DrivenWindows, RoadRecording, driven_windows, expected_files, from_folder
 from logger.chart_data import Array, Curves, Line
 from logger.errors import BadInput
-from logger.geodesy import EARTH_RADIUS_M
+from logger.geodesy import east_and_north_m
 from logger.roads.iso8608 import iri_class
 from logger.studies.study import Column, Item, Picture, Result, Study, Table, Word, Workload
 
@@ -103,14 +103,13 @@ def _map(drives: list[DrivenWindows]) -> Curves:
     """Each row a dot of its class, east and north of the first."""
     places = np.concatenate([(one.begin_deg + one.end_deg) / 2 for one in drives])
     iri = np.concatenate([one.iri_m_per_km for one in drives])
-    north_m, east_m = (EARTH_RADIUS_M * np.radians(places - places[0])).T
-    east_m = east_m * np.cos(np.radians(places[0, 0]))
+    east_m, north_m = east_and_north_m(*places.T, *places[0].tolist())
     classes = np.array([iri_class(one) if np.isfinite(one) else "unknown" for one in iri])
     there = sorted(set(classes.tolist()))
     # The first two lines of a chart are blue and red: what is smoothest and what is roughest.
     lines = tuple(Line(name, east_m[classes == name], north_m[classes == name], dots=True)
                   for name in dict.fromkeys((there[0], there[-1], *there)))
-    return Curves("Map of the rows, by class of their IRI", "east [m]", "north [m]", lines)
+    return Curves("Map of the rows, by class of their IRI", "east [m]", "north [m]", lines, equal=True)
 
 
 _DOWNLOAD = "clone github.com/commaai/comma2k19 (MIT), which holds a segment in Example_1, or download the whole set"

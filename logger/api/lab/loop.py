@@ -35,7 +35,6 @@ from logger.question import Notify, function
 from logger.report import document as doc
 from logger.report.blocks import Block, Blocks, Bullets, Hint, Section, Table, page, text
 from logger.report.charts import chart
-from logger.report.maps import MapLine, ways_map
 from logger.report.quantities import wrapped
 from logger.store.formats import vehicle_file as vehicle_format
 from logger.vehicle.effect import Chosen
@@ -445,17 +444,17 @@ def _row(name: str, found: dict[str, Any]) -> tuple[str, ...]:
             f"{beside['within_one']:.0%}", f"{beside['within_two']:.0%}")
 
 
-def field_page(title: str, about: Sequence[str], measured: Sequence[MapLine], driven: Sequence[MapLine], story: Story,
-         before: Assessment, after: Assessment, answer: Sequence[str]) -> doc.Html:
+def field_page(title: str, about: Sequence[str], ways: Curves, story: Story, before: Assessment,
+         after: Assessment, answer: Sequence[str]) -> doc.Html:
     """The whole of it as one HTML document.
 
     about             what the drives are, a paragraph each
-    measured          lines that were measured, and ``driven`` the drives on them
+    ways              lines that were measured, and the drives on them
     before, after     the road of a drive that the lab did not see, by the file as it was and by the last one
     answer            what is true, where that is known
     """
     first, last = (figures_of(one)["comparison"] for one in (before, after))
-    return page(title, ", ".join(one.name for one in driven), [
+    return page(title, ", ".join(one.name for one in ways.lines if one.dots), [
         doc.tiles([
             ("Bias of the IRI, initially", f"{first['bias']:+.1%}", f"R2 {first['r2']:.2f}"),
             ("finally", f"{last['bias']:+.1%}", f"R2 {last['r2']:.2f}"),
@@ -463,8 +462,7 @@ def field_page(title: str, about: Sequence[str], measured: Sequence[MapLine], dr
             ("finally", f"{steps(story)[-1][1]:.3f}", "refitted"),
         ]),
         *about,
-        Section("The drives", [ways_map(measured, driven), Hint(
-            "Wide: the measured lines. Dots: the car's GPS positions, one a second.")]),
+        Section("The drives", [ways, Hint("Lines: measured. Dots: the car's GPS positions, one a second.")]),
         Section("NRMSE, model by model", [falling(f"NRMSE on {JUDGED_ON}", steps(story), story.floor),
                                           *ending(story)]),
         Section("What was missing", diagnosing.diagnosis_summary(story.diagnoses[0])),

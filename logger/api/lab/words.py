@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from logger.chart_data import Curves, Line
+from logger.chart_data import Bars, Curves, Line
 from logger.lab.likelihood.record_band import ComparedBand
 from logger.lab.likelihood.whittle import LOWEST_HZ
 from logger.lab.residuals.breakdown import Part
@@ -19,7 +19,6 @@ from logger.lab.residuals.unexplained import Shape, SpatialLine
 from logger.lab.selection.holdout import AS_FILED, JUDGED_ON, REFITTED, ErrorStep, fit_percent, rising
 from logger.printable import percent
 from logger.report.blocks import Block, Detail, Hint, Table
-from logger.report.charts import Steps
 from logger.report.quantities import enumerated
 from logger.runs import shortened
 
@@ -204,12 +203,12 @@ def band_json(band: ComparedBand | None) -> dict[str, Any]:
 
 
 def steps_section(steps: Sequence[tuple[str, float]], floor: float, *more: Block) -> Detail:
-    """The error of each step on what no fit saw, as a falling curve and as a table."""
+    """The error of each step on what no fit saw, as bars and as a table."""
     rows = [(f"{number}", words, f"{error:.4f}") for number, (words, error) in enumerate(steps)]
     return Detail("NRMSE, model by model", [falling(f"NRMSE on {JUDGED_ON}", steps, floor),
                                             Table(("Step", "Model", "NRMSE"), rows, (0, 1)), *more])
 
 
-def falling(title: str, steps: Sequence[tuple[str, float]], floor: float) -> Steps:
-    """The error of each step as a falling curve, down to the noise."""
-    return Steps(title, "NRMSE", tuple(steps), (floor, "noise floor"))
+def falling(title: str, steps: Sequence[tuple[str, float]], floor: float) -> Bars:
+    """The error of each step, beside the noise."""
+    return Bars(title, "NRMSE", tuple(steps), (floor, "noise floor"))

@@ -1,15 +1,4 @@
-"""Section 7.2: what the dissertation leaves to later work.
-
-Section 7.2, second item: a full car, whose left and right tracks differ.
-
-Section 7.2, first item: the input found from the response, and the car without any input.
-
-Section 7.2, fourth item: vehicles of other sizes, larger inputs, and bridges and tubes at higher speeds.
-
-Section 7.2, third item: a sensor away from the centre of gravity feels pitch.
-
-Section 7.2, fifth item: an IRI that does not depend on the speed, and how near to the limit it is.
-"""
+"""Section 7.2: what the dissertation leaves to later work."""
 
 from dataclasses import dataclass, replace
 
@@ -30,7 +19,7 @@ from logger.runs import Run
 from logger.shipped import vehicle_file, vehicle_names
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.studies.dissertation.chapter_5 import TUBE_M, TUBE_SPACING_M, tube
-from logger.studies.dissertation.chapter_6_roads import SPEEDS_MPH, WAVINESS
+from logger.studies.dissertation.chapter_6 import SPEEDS_MPH, WAVINESS
 from logger.studies.drives import (
     BUMP_HEIGHT_M,
     BUMP_MPS,
