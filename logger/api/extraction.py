@@ -9,7 +9,7 @@ It does not matter what recorded it: a dump of the box (``api.extraction``) and 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -166,10 +166,8 @@ class ExtractedRun:
 
     def as_json(self) -> dict[str, Any]:
         """For a program."""
-        return {"run": str(self.run), "seconds": self.seconds, "metres": self.metres,
-                "on_profile_m": self.on_profile_m, "place_std_m": self.place_std_m, "by_road": self.by_road,
-                "delay_s": self.delay_s, "delay_std_s": self.delay_std_s, "gaps": self.gaps,
-                **dict(zip(("speed_scale", "speed_scale_std"), self.speed_scale or (None, None), strict=True))}
+        scale = zip(("speed_scale", "speed_scale_std"), self.speed_scale or (None, None), strict=True)
+        return asdict(self) | {"run": str(self.run), **dict(scale)}
 
     @property
     def unusual_speed_scale(self) -> tuple[float, float] | None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,7 @@ from logger.api.shown import Shown, table
 from logger.arrays import Array, Bools
 from logger.errors import BadInput
 from logger.printable import word
+from logger.records import WindowRecord
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
@@ -68,13 +69,8 @@ class Log(Mapping[str, npt.NDArray[Any]], Shown):
             Line("IRI", at_m[known], self["iri_m_per_km"][known], np.nan_to_num(self["iri_std_m_per_km"][known])),))]
 
 
-_NUMBERS = (
-    "segment", "drive", "duration_s", "distance_start_m", "distance_end_m", "lat_deg", "lon_deg", "speed_mps",
-    "iri_m_per_km", "iri_std_m_per_km", "iri_rms_m_per_km", "a_w_mps2", "mtvv_mps2", "vdv_mps175", "crest_factor",
-    "accel_rms_mps2", "samples", "clipped_samples", "a_w_std_mps2", "mtvv_std_mps2", "vdv_std_mps175", "a_w_raw_mps2",
-    "mtvv_raw_mps2", "vdv_raw_mps175", "iri_level_std_m_per_km", "iri_common_std_m_per_km", "iri_place_std_m_per_km",
-)
 _WORDS = ("comfort", "iri_class")
+_NUMBERS = tuple(one.name for one in fields(WindowRecord) if one.name not in ("t_us", "utc_us", "flags", *_WORDS))
 
 
 def read_log(path: Path | str) -> Log:

@@ -256,12 +256,6 @@ def _roughest(result: ProfileIri) -> float:
     return max(result.row(0).values())
 
 
-def _cut_short(result: ProfileIri) -> list[str]:
-    """What is to be said of a profile that no window fits into."""
-    return ["The profile is shorter than one window (--window): its IRI is that of the whole profile."] if (
-        all(window.partial for window in result.windows)) else []
-
-
 def _of_profile(profile: Profile, name: str) -> str:
     length_m = (len(profile.elevation_m) - 1) * profile.spacing_m
     return (f"{name}: {length_m:.2f} m ({length_m / FOOT_M:.1f} ft), one sample every "
@@ -290,7 +284,8 @@ def iri_blocks(result: ProfileIri, profile: Profile, name: str) -> list[Block]:
             f"Roads like this: {', '.join(road_kinds(roughness)) or 'none of the usual'}",
             f"Ride: {ride_words(roughness)}",
             *([doubt] if (doubt := unit_doubt(_roughest(result))) else [])]),
-        Lines(_cut_short(result)), Table(heads, rows, (len(heads) - 1,)),
+        Lines(["The profile is shorter than one window (--window): its IRI is that of the whole profile."]
+              * all(window.partial for window in result.windows)), Table(heads, rows, (len(heads) - 1,)),
         Lines([_of_profile(profile, name), *resampled])]
 
 

@@ -33,7 +33,6 @@ from logger.files import make_folder, together, write_file, write_text
 from logger.report.quantities import columns, wrapped
 
 if TYPE_CHECKING:
-    from logger.api.drives import Run
     from logger.api.extraction import Extracted
     from logger.api.lab.loop import Say
     from logger.estimation.batch import Assessment
@@ -180,7 +179,7 @@ _LAB_EXPLAINED = {
 def lab(out: Path, unpack_only: bool, as_json: bool) -> None:
     """Unpack the drives into ``out`` and find what is missing."""
     from logger.api.lab.bench import bench_with, require_compiler, sought_effects
-    from logger.api.lab.loop import unsaid_lines
+    from logger.api.lab.loop import chapter, unsaid_lines
 
     if not unpack_only:
         require_compiler("ridelog demo --lab", sought_effects().values())
@@ -194,7 +193,11 @@ def lab(out: Path, unpack_only: bool, as_json: bool) -> None:
         print(wrapped([_INTRODUCTION]))
     given = bench_with(CompareQuestion(LAB.vehicle, folders, warn=warned))
     found = walk(given, out, take, unsaid_lines if as_json else say, _explained)
-    print(json.dumps(found.as_json(), allow_nan=False) if as_json else "\n".join(_answer(found.story)))
+    if as_json:
+        print(json.dumps(found.as_json(), allow_nan=False))
+        return
+    sentence, table = truth_beside(found.story, LAB)
+    print("\n".join([*chapter("The answer"), wrapped([sentence]), "", *table]))
 
 
 def _explained(chapter: str, _effect: str, _vehicle: str) -> str:
@@ -204,14 +207,6 @@ def _explained(chapter: str, _effect: str, _vehicle: str) -> str:
 def unpack(out: Path) -> list[Path]:
     """Write the drives below ``out``, as ``unpacked``; their folders."""
     return sorted({path.parent for path in unpacked("lab.zip", out)}, reverse=True)
-
-
-def _answer(story: Story) -> list[str]:
-    """What the simulated car truly was, and what was found."""
-    from logger.api.lab.loop import chapter
-
-    sentence, table = truth_beside(story, LAB)
-    return [*chapter("The answer"), wrapped([sentence]), "", *table]
 
 
 def truth_beside(story: Story, car: TrueCar) -> tuple[str, list[str]]:
@@ -257,13 +252,14 @@ def field(out: Path, unpack_only: bool, as_json: bool) -> None:
     """Unpack the drives into ``out``, find what is missing, and judge the fourth with and without it."""
     from logger.api.lab.bench import require_compiler
     from logger.api.lab.loop import as_json as story_json
-    from logger.api.lab.loop import unsaid_lines
+    from logger.api.lab.loop import ending, figures_of, iri_blocks, unsaid_lines
+    from logger.report.blocks import text
     from logger.store.formats.effect_file import shipped_effects
 
     if not unpack_only:
         require_compiler("ridelog demo --field", shipped_effects().values())
     unpacked("field.zip", out)
-    first, fourth = [_dump(out, name) for name in DRIVES], _dump(out, FOURTH)
+    first, fourth = [out / f"{name}.dump.gz" for name in DRIVES], out / f"{FOURTH}.dump.gz"
     commands = _Commands(out, first, fourth, FIELD.vehicle)
     if unpack_only:
         print(json.dumps({"vehicle": FIELD.vehicle, "dumps": [*map(str, first), str(fourth)],
@@ -281,12 +277,14 @@ def field(out: Path, unpack_only: bool, as_json: bool) -> None:
     after = _judged(out / RUNS / FOURTH, last, "The fourth drive, with the new file", "after", commands, tell)
     page, sentence, table = out / PAGE, *truth_beside(story, FIELD)
     _write_page(page, out, story, before, after, sentence)
-    tell(_ending(story, before, after, page))
+    tell(["", "=== The end ===", "", text([*ending(story), *iri_blocks(before, after)]), "",
+          f"All of it as a page: {page} (open it in a browser; it needs no network)"])
     tell(["", "=== The answer ===", "", wrapped([sentence]), "", *table])
     if as_json:
         print(json.dumps({"runs": [one.as_json() for each in extracted for one in each.runs], **story_json(story),
-                          "fourth": _fourth_json(before, after), "truth": _truth_json(), "page": str(page)},
-                         allow_nan=False))
+                          "fourth": {"before": figures_of(before), "after": figures_of(after)}, "page": str(page),
+                          "truth": {"effect": FIELD.effect, "parameters": dict(FIELD.values),
+                                    "numbers_times": dict(FIELD.off)}}, allow_nan=False))
 
 
 def unpacked(archive: str, out: Path) -> list[Path]:
@@ -319,7 +317,7 @@ class _Commands:
 
     def __init__(self, out: Path, first: list[Path], fourth: Path, vehicle: str) -> None:
         self._out, self._first, self._fourth, self.vehicle = out, first, fourth, vehicle
-        self.runs = [out / RUNS / _name(one) for one in first]
+        self.runs = [out / RUNS / name for name in DRIVES]
         self._listed = " ".join(map(str, self.runs))
 
     def extract(self) -> tuple[str, str]:
@@ -364,25 +362,19 @@ def _story(commands: _Commands, out: Path, tell: Say) -> Story:
     return go_through(given, out, take, tell, progress, commands.explain)[0]
 
 
-def _run(folder: Path) -> Run:
-    from logger.api.drives import checked_run
-    from logger.store.formats.record_checks import RecordRules
-
-    return checked_run(folder, RecordRules(None, None))[0]
-
-
 def _judged(folder: Path, vehicle: str, title: str, why: str, commands: _Commands, tell: Say) -> Assessment:
     """The road of a drive, read in the steps that its record says, as ``ridelog estimate`` finds it."""
-    from logger.api.drives import as_json, assessed, blocks, sensor_of
+    from logger.api.drives import as_json, assessed, blocks, checked_run, sensor_of
     from logger.report.blocks import Hint, Lines, Table, text
     from logger.shipped import vehicle_path
+    from logger.store.formats.record_checks import RecordRules
     from logger.store.formats.vehicle_file import read_model
     from logger.units import WINDOW_M
 
     tell(_headed(title, why, commands.estimate(folder, vehicle)))
     with progress() as say:
         say("estimating the road")
-        drive = _run(folder)
+        drive, _ = checked_run(folder, RecordRules(None, None))
         found = assessed(drive, read_model(vehicle_path(vehicle)), *sensor_of(drive), WINDOW_M)
     # Of what is printed: the mean, and the table's head, last row and remark.
     content = list(blocks(found, as_json(str(folder), found)))
@@ -416,24 +408,6 @@ def _write_page(file: Path, out: Path, story: Story, before: Assessment, after: 
                                 after, [sentence.partition(" Difference")[0]]))
 
 
-def _ending(story: Story, before: Assessment, after: Assessment, page: Path) -> list[str]:
-    from logger.api.lab.loop import ending, iri_blocks
-    from logger.report.blocks import text
-
-    return ["", "=== The end ===", "", text([*ending(story), *iri_blocks(before, after)]), "",
-            f"All of it as a page: {page} (open it in a browser; it needs no network)"]
-
-
-def _truth_json() -> dict[str, Any]:
-    return {"effect": FIELD.effect, "parameters": dict(FIELD.values), "numbers_times": dict(FIELD.off)}
-
-
-def _fourth_json(before: Assessment, after: Assessment) -> dict[str, Any]:
-    from logger.api.lab.loop import figures_of
-
-    return {"before": figures_of(before), "after": figures_of(after)}
-
-
 # --- words ---
 
 
@@ -446,16 +420,6 @@ def _headed(title: str, why: str, *commands: str) -> list[str]:
 def _typed(why: str, *commands: str) -> str:
     """What a step is for, and what to type for it."""
     return "\n".join([wrapped([_EXPLAINED[why]]), "", *(f"    {one}" for one in commands)])
-
-
-def _dump(out: Path, name: str) -> Path:
-    return out / f"{name}.dump.gz"
-
-
-def _name(dump: Path) -> str:
-    from logger.api.extraction import name_of
-
-    return name_of(dump)
 
 
 _SHOWN = {

@@ -502,19 +502,24 @@ def tests(model: DriveModel, fit: Fit) -> tuple[Test, Test]:
 
 def measured_json(fit: Fit, white: Test, free_of_road: Test) -> dict[str, Any]:
     """All of it for a program; null where nothing is known."""
-    names = list(fit.parameters)
-    return {
-        "parameters": fit.parameters, "standard_errors": fit.standard_errors,
-        "error_before": fit.error_before, "error_after": fit.error_after, "converged": fit.converged,
-        "start": {one.name: one.start for one in fit.free},
-        "bounds": {one.name: [one.low, one.high] for one in fit.free},
+    return _fit_json(fit, fit.free, list(fit.parameters)) | {
         "interval_95": {one.name: list(interval(fit, one)) for one in fit.free},
-        "correlation": _correlation_json(names, fit),
-        "at_bound": fit.at_bound, "iterations": fit.iterations,
         "noise": {"model": fit.noise.name, **fit.noise.levels},
         "residuals_white_p_value": _p_value(white), "residuals_free_of_road_p_value": _p_value(free_of_road),
         "cannot_tell": list(doubts(fit, white, free_of_road)),
     }
+
+
+def _fit_json(fit: Fit | RoadFit, free: Sequence[Free], names: Sequence[str]) -> dict[str, Any]:
+    """What every fit has; ``names``: of the rows of its covariance."""
+    return {
+        "parameters": fit.parameters, "standard_errors": fit.standard_errors,
+        "error_before": known_number(fit.error_before), "error_after": known_number(fit.error_after),
+        "converged": fit.converged, "start": {one.name: one.start for one in free},
+        "bounds": {one.name: [one.low, one.high] for one in free},
+        "correlation": {name: dict(zip(names, row, strict=True))
+                        for name, row in zip(names, _correlation(fit).tolist(), strict=True)},
+        "at_bound": fit.at_bound, "iterations": fit.iterations}
 
 
 def doubts(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
@@ -646,11 +651,6 @@ def _pairs(names: Sequence[str], fit: Fit | RoadFit, between: str) -> list[tuple
                    for i, j in combinations(range(len(names)), 2)), key=lambda pair: -abs(pair[1]))
 
 
-def _correlation_json(names: Sequence[str], fit: Fit | RoadFit) -> dict[str, dict[str, float]]:
-    return {name: dict(zip(names, row, strict=True))
-            for name, row in zip(names, _correlation(fit).tolist(), strict=True)}
-
-
 def _correlated(names: Sequence[str], fit: Fit | RoadFit) -> Iterator[str]:
     if large := [f"{both} {value:+.2f}" for both, value in _pairs(names, fit, " and ") if abs(value) > _MENTIONED]:
         yield f"Correlated estimates (correlation beyond {_MENTIONED:g}): {'; '.join(large)}."
@@ -709,16 +709,9 @@ _UNITS = {GD_N0: "cm3", NOISE: "m/s2", OFFSET: "m"}
 
 def unmeasured_json(fit: RoadFit, free: Sequence[Free]) -> dict[str, Any]:
     """All of it for a program."""
-    return {
-        "parameters": fit.parameters, "standard_errors": fit.standard_errors,
-        "error_before": known_number(fit.error_before), "error_after": known_number(fit.error_after),
-        "converged": fit.converged,
-        "start": {one.name: one.start for one in free}, "bounds": {one.name: [one.low, one.high] for one in free},
+    return _fit_json(fit, free, fit.names) | {
         "road": fit.roads, "road_standard_errors": fit.road_errors,
-        "correlation": _correlation_json(fit.names, fit),
-        "at_bound": fit.at_bound, "iterations": fit.iterations,
-        "cannot_tell": [finding.words for finding in fit.verdict],
-    }
+        "cannot_tell": [finding.words for finding in fit.verdict]}
 
 
 def unmeasured_lines(fit: RoadFit, free: Sequence[Free]) -> Iterator[str]:
