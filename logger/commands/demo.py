@@ -400,10 +400,10 @@ def _write_page(file: Path, out: Path, story: Story, before: Assessment, after: 
     for name in drives:
         _, columns = read_columns(out / RUNS / name / DRIVE)
         places[name] = columns[PLACE[0]], columns[PLACE[1]]
-    begin_deg = [float(one[0]) for one in places[LINE]]
+    every, (lat0_deg, lon0_deg) = round(RATE_HZ), (float(one[0]) for one in places[LINE])
     ways = Curves("The drives", "east [m]", "north [m]", tuple(
-        Line(name, *east_and_north_m(*(one[::round(RATE_HZ)] for one in place), *begin_deg), dots=name in drives)
-        for name, place in places.items()), equal=True)
+        Line(name, *east_and_north_m(lat_deg[::every], lon_deg[::every], lat0_deg, lon0_deg), dots=name in drives)
+        for name, (lat_deg, lon_deg) in places.items()), equal=True)
     write_text(file, field_page(f"{FIELD.vehicle}: four drives, and what was missing", _ABOUT, ways, story, before,
                                 after, [sentence.partition(" Difference")[0]]))
 
