@@ -96,12 +96,14 @@ class LearnedLaw(CommandResult):
         return page(f"{self.vehicle}: a law learned from runs", runs, self.blocks())
 
     def next_words(self, question: Any, written: Mapping[str, Sequence[Path]]) -> str:
-        """How to add the law."""
+        """How to add the law, together with what it was fitted with."""
         law = next((one for one in written.get("--out", ()) if one.suffix == ".py"), None)
-        if not self.source or law is None:
+        if not self.source or law is None or self.found.addition is None:
             return ""
-        return "Next: " + question.command(
-            f"add-effect {law if law.is_absolute() else f'./{law}'} {{}} --out with-law.yaml")
+        file = str(law) if law.is_absolute() else f"./{law}"
+        names = [file, *(one.file or one.effect.name for one in self.found.addition.new
+                         if one.effect.name in self.verdict)]
+        return "Next: " + question.command(f"add-effect {'+'.join(names)} {{}} --out with-law.yaml")
 
 
 def law_of(question: LearnQuestion) -> LearnedLaw:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 from pathlib import Path
 
 import numpy as np
@@ -58,7 +59,8 @@ def test_a_damper_s_law_is_nearer_than_lugre_and_bouc_wen(tmp_path: Path, capsys
     vehicle, runs, kept = write_part(tmp_path, "valves with play")
     law, better = tmp_path / "law.py", tmp_path / "better.yaml"
     assert main(["learn", "--vehicle", str(vehicle), "--out", str(law), *map(str, runs)]) == 0
-    assert main(["add-effect", str(law), "--vehicle", str(vehicle), "--out", str(better), *map(str, runs)]) == 0
+    advice = capsys.readouterr().out.partition("Next: ridelog ")[2].splitlines()[0]
+    assert main(shlex.split(advice.replace("with-law.yaml", str(better)))) == 0
     capsys.readouterr()
     main(["compare", "--vehicle", str(better), str(write_bench(tmp_path / "kept", *kept)), "--json"])
     ours = json.loads(capsys.readouterr().out)["error"]
