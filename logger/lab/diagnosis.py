@@ -46,7 +46,7 @@ from logger.lab.selection.evidence import FALSE_ALARM, IMITATION, INDISTINGUISHA
 from logger.lab.selection.filter_without_delay import below_filter_without_delay
 from logger.lab.selection.holdout import AS_FILED, REFITTED, ErrorStep, HoldOut, cross_validate
 from logger.lab.selection.screening import Baseline, Screened, misalignment
-from logger.lab.selection.starts import UnknownNumbers
+from logger.lab.selection.starts import UnknownNumbers, needs_starts
 from logger.lab.selection.stepwise import MeasuredRoad, Search, SearchEffort, Selection, is_outside_data
 from logger.runs import BY_ROAD, Past, are_on_rig
 from logger.vehicle import named_parameters
@@ -250,7 +250,7 @@ def begin_search(posterior: Posterior, effects: Mapping[str, Effect], present: S
     tried = [one for name, one in effects.items() if name not in obstacles]
     progress("refitting the model's parameters")
     nominal = posterior.start(present)
-    unknown = UnknownNumbers() if posterior.prior.is_vague else None
+    unknown = UnknownNumbers() if needs_starts(posterior) else None
     before = refit(posterior, nominal) if unknown is None else unknown.fitted(posterior, present)
     search: Search[Baseline, Screened, CandidateFit] = Search(
         tried, len(present), misalignment(posterior, nominal), progress,

@@ -4,9 +4,9 @@ Problem: something is missing that is none of the known effects, and a diagnosis
 Solution: first the known effects are searched, as in a diagnosis. Where nothing is missing, nothing is learned. Else
 families of laws are searched as effects are, by the same screening, fits and evidence, on the model without effects and
 on top of the known ones: every number counts, so that a curve has to be worth its points. Known effects are sought on
-top of a law that leaves something. The model with the most evidence is taken. Where known effects explain everything, a
-law replaces them only by decisive evidence. A law whose numbers mean nothing is refused, and the next one is tried; one
-in whose place a known effect explains more is refused for that effect.
+top of the better of the two, where it leaves something. Where known effects explain everything, a law replaces them
+only by decisive evidence. A law whose numbers mean nothing is refused, and the next one is tried; one in whose place a
+known effect explains more is refused for that effect.
 """
 
 from __future__ import annotations
@@ -138,13 +138,14 @@ class FamilySearch:
         if unexplained and now is not before and (alone is None or exceeds_noise(alone.now)):
             found.append(self._found_on(now, True))
         least = now.score - (0.0 if unexplained else DECISIVE)
-        best = min((one for one in found if one is not None and one.now.score < least),
-                   key=lambda one: one.now.score, default=None)
-        return None if best is None else self._law(best)
+        for one in sorted((one for one in found if one is not None), key=lambda one: one.now.score):
+            whole = self._with_known(one)
+            if whole is not None and whole.now.score < least:
+                return self._law(whole)
+        return None
 
     def _found_on(self, base: Baseline, any_family: bool) -> Selection | None:
-        """The model with a law and what else is missing beside it, sought on a model; None where no law says anything.
-        """
+        """A model with a law more; None where none says anything."""
         context = LawContext(base.posterior, base.state)
         drafts = {draft.effect: draft for family in self.families.values() if any_family or family.stands_out
                   for draft in family.drafts(context) if draft.key not in self.refused}
@@ -160,7 +161,7 @@ class FamilySearch:
             if law.name in gains:
                 why = refusal(drafts[law], now, self.search.without(now, law.name))
                 if why is None:
-                    return self._with_known(replace(found, before=before, now=now, gains=gains), law)
+                    return replace(found, before=before, now=now, gains=gains)
                 self.refused[drafts[law].key] = why
             search.effects = [one for one in search.effects if one is not law]
             rest = replace(found.first, fits=tuple(one for one in found.first.fits if one.effect is not law))
@@ -169,11 +170,12 @@ class FamilySearch:
             found = search.go_on(none, rest)
         return None
 
-    def _with_known(self, found: Selection, law: Effect) -> Selection | None:
+    def _with_known(self, found: Selection) -> Selection | None:
         """A model with a law, and known effects sought on top of it where it leaves something; None where the law is
         not needed beside these."""
         if not exceeds_noise(found.now):
             return found
+        law = next(one.effect for one in found.now.effects if one.effect in self.drafts)
         search = replace(self.search, effects=[*self.search.effects, law], _promising=set(), _rivals=dict(found.rivals))
         whole = search.go_on(found)
         return whole if law.name in whole.gains else None

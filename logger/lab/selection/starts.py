@@ -257,9 +257,15 @@ def _tuned(posterior: Posterior, logs: Array, hz: float) -> Array:
     return logs + 2 * off[np.abs(off).argmin()] * springs if len(off) else logs
 
 
+def needs_starts(posterior: Posterior) -> bool:
+    """Whether a fit may end in a wrong valley of the car's numbers: where they are not known, but for a part that its
+    bench moves, whose force is linear in them."""
+    return posterior.prior.is_vague and posterior.vehicle.model != "component"
+
+
 def fitted_from_starts(posterior: Posterior, present: Sequence[Chosen]) -> LinearModel:
     """The model with some effects, fitted; where the car's numbers are not known, from where a search's starts end."""
-    if not posterior.prior.is_vague:
+    if not needs_starts(posterior):
         return fit_model(posterior, posterior.start(present))
     found = UnknownNumbers().fitted(posterior.simulated(SEARCH_HZ), present).linear
     state = found.state
