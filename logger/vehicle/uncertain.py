@@ -236,6 +236,8 @@ def _factor(effect: Effect, name: str, scales: Scales, wheelbase: float) -> floa
             return scales.force**of_force * scales.way**of_way * scales.time**of_time
     if name.endswith(_LENGTH):
         return scales.way if isinstance(effect, ForceEffect) else wheelbase
+    if name.endswith("_hz") and any(one.name.endswith("_kg") for one in effect.parameters):
+        return 1 / scales.time  # of a mass that swings by itself
     return 1.0  # frequencies that resonate are looked for everywhere between bounce and what the recorder keeps
 
 

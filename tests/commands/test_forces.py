@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 import pytest
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import butter, lsim, sosfiltfilt
 
 import ridelog
 from logger.api.lab.bench import bench_with
@@ -28,6 +28,7 @@ from ..support.slow import slow
 Array = npt.NDArray[np.float64]
 RATE_HZ = 250.0
 TIME_S = np.arange(0, 12, 1 / RATE_HZ)
+FINE_S = np.arange(16 * len(TIME_S)) / (16 * RATE_HZ)
 
 
 def noise(highest_hz: float, size: float, seed: int) -> Course:
@@ -475,6 +476,26 @@ def test_a_part_is_moved_or_pushed(tmp_path: Path) -> None:
     run = written(tmp_path / "other", {"accel_z_mps2": np.sin(TIME_S)}, way, "source: me\n")
     with pytest.raises(BadInput, match=r"part.yaml: .*expected its force to be measured of a component"):
         ridelog.compare(tmp_path / "part.yaml", [run])
+
+
+@pytest.mark.slow
+def test_a_second_mode_is_a_mass_that_swings_on_the_first(tmp_path: Path) -> None:
+    """A beam of which a force drives two modes where its sensor sits, the second above all that its file has. Two
+    masses of which one swings on the other move alike: together they have the mass of both modes (R. M. Foster,
+    Bell System Technical Journal 3, 1924, 259)."""
+    masses, springs, dampers = [1.2, 3.6], [3300.0, 3.6 * (2 * np.pi * 46)**2], [3.0, 40.0]
+    push, accel = noise(70.0, 8.0, 4), 0.0
+    for mass, spring, damper in zip(masses, springs, dampers, strict=True):
+        mode = ([1.0, 0.0, 0.0], [mass, damper, spring])
+        accel = accel + lsim(mode, push(FINE_S), FINE_S)[1][::16]
+    accel = accel + np.random.default_rng(8).normal(0.0, 0.02, len(TIME_S))
+    run = written(tmp_path / "run", {"accel_z_mps2": accel}, {"force_n": push(TIME_S)}, BODY)
+    (tmp_path / "beam.yaml").write_text(
+        "name: beam\nmodel: single_mass\nmass_kg: 1.2 +- 2%\nstiffness_n_per_m: 2000 +- 60%\n"
+        "damping_n_s_per_m: unknown\n")
+    found = ridelog.diagnose(tmp_path / "beam.yaml", [run])
+    assert found.verdict == ("occupant",)
+    assert found.steps[-1][1] < 0.05
 
 
 @pytest.mark.slow
