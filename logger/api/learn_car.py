@@ -50,9 +50,8 @@ from logger.store.formats.vehicle_file import CarModel, write_model
 from logger.store.log.log_name import OwnFile, inside_of, log_name
 from logger.store.log.sidecar import load_sidecar
 from logger.units import MPH_MPS
-from logger.vehicle.named_parameters import changed, read, sized
-from logger.vehicle.published_cars import NUMBERS, USUAL_MASS_KG, coordinates_of, share_of
-from logger.vehicle.uncertain import NumberErrors
+from logger.vehicle.named_parameters import changed, read
+from logger.vehicle.published_cars import NUMBERS, USUAL_MASS_KG, coordinates_of, number_errors, share_of
 from logger.vehicle.vehicle import GENERIC
 
 _GIVEN_STD_M, _USUAL_STD_M = 0.1, 0.2
@@ -80,11 +79,6 @@ kg 1.6."""
 _LIMP, _ONE_SPEED = 0.1, 1.5
 """A damping ratio below it is that of a worn damper (new ones have 0.2 to 0.4); a ratio of speeds that is too small to
 tell the car's frequencies from the road's waves."""
-_UNEVEN = {"damping_ratio": -0.014, "unsprung_to_sprung": -0.026, "contact_patch_m": -0.017}
-"""What dampers that work harder in rebound do to the logarithms of the numbers that are found: 0.6, a root mean square
-of ratios from 1:1 to 2:1, of what 2:1 did to eight simulated half cars (an IRI came out 1 to 4 % higher). No reading
-tells it: their skewness and the body's answer to the envelope of the wheels' hop are those of a linear car within what
-20 minutes show."""
 _SPEEDS_MPH = (10, 20, 30, 40, 50, 60, 70)
 _COMPARED = (*(f"{end}.{name}" for end in ("front", "rear") for name in ("bounce_hz", "damping_ratio", "hop_hz")),
              "wheelbase_m")
@@ -252,27 +246,41 @@ def learned(question: LearnCarQuestion) -> LearnedVehicle:
     question.progress("finding the car")
     problem, car = UnknownCar(joined([one.spectra for one in used]), knowledge).learn()
     question.progress("checking it")
-    rough, smooth = problem.by_level(car)
-    unlike = rough.log_evidence + smooth.log_evidence - car.log_evidence
-    unseen = _checked_drives(used, knowledge, car.x, unlike, question.progress)
+    motion = problem.motion(car)
+    by_motion, alike = problem.by_motion(car, np.full(len(motion), np.median(motion)))
+    nonlinear = alike < -_TWO_CARS
+    if nonlinear:  # two cars, of which one drove rough roads only, are each linear within their drives
+        drive = problem.spectra.drive
+        medians = np.array([np.median(motion[drive == one]) for one in range(problem.drives)])
+        nonlinear = problem.by_motion(car, medians[drive])[1] < -_TWO_CARS
+    unseen = _checked_drives(used, knowledge, car.x, -alike if nonlinear else 0.0, question.progress)
     _check_car(problem, car)
     _check_wheelbase(problem, car)
-    uneven = np.array([_UNEVEN.get(one.rpartition(".")[2], 0.0) for one in COORDINATES])
-    missing, covariance = [], car.covariance + np.outer(uneven, uneven)
-    if unlike > _TWO_CARS:
-        missing, off = [_not_linear(rough, smooth)], (rough.x - smooth.x) / 2
+    missing, covariance = list(_uneven_dampers(car)), car.covariance
+    if alike < -_TWO_CARS:
+        much, little = by_motion
+        missing, off = [_not_linear(much, little), *missing], much.x - little.x
         covariance = covariance + np.outer(off, off)
     return _answer(question, used, problem, replace(car, covariance=covariance), missing, unseen)
 
 
-def _not_linear(rough: LearnedCar, smooth: LearnedCar) -> str:
-    """What is said of a car that answers rough roads otherwise than smooth ones."""
-    name = _most_apart(rough, smooth, _COMPARED[:-1])
+def _uneven_dampers(car: LearnedCar) -> Iterator[str]:
+    """What is said where the wheels' hop has the harmonics of uneven dampers."""
+    at = COORDINATES.index("dampers.unevenness")
+    uneven, std = abs(float(car.x[at])), float(car.std[at])
+    if uneven > _SIGMA * std:
+        yield (f"Dampers are uneven: {(1 + uneven) / (1 - uneven):.2g} ± {2 * std / (1 - uneven) ** 2:.1g} times as "
+               "hard one way as the other. A measured street and ridelog diagnose show which way (damper_asymmetry).")
+
+
+def _not_linear(much: LearnedCar, little: LearnedCar) -> str:
+    """What is said of a car that answers otherwise where its suspensions move much."""
+    name = _most_apart(much, little, _COMPARED[:-1])
     at = COORDINATES.index(name)
-    like = "friction" if rough.x[at] < smooth.x[at] else "a progressive spring or damper"
-    return (f"This car is nonlinear: its {_words_of(name)} is {_value(rough, name)} on rough roads and "
-            f"{_value(smooth, name)} on smooth ones, as with {like}. The standard errors include half the difference. "
-            "To find the effect, drive a measured street and run ridelog diagnose.")
+    like = "friction" if much.x[at] < little.x[at] else "a progressive spring or damper"
+    return (f"This car is nonlinear: its {_words_of(name)} is {_value(much, name)} where its suspensions move fast and "
+            f"{_value(little, name)} where they move slowly, as with {like}. The standard errors include the "
+            "difference. To find the effect, drive a measured street and run ridelog diagnose.")
 
 
 def _most_apart(one: LearnedCar, other: LearnedCar, names: Sequence[str]) -> str:
@@ -300,11 +308,11 @@ def _moved(x: Array, at: int, step: float) -> Array:
     return moved
 
 
-def _checked_drives(used: Sequence[_Used], knowledge: CarKnowledge, start: Array, unlike: float, tell: Any
+def _checked_drives(used: Sequence[_Used], knowledge: CarKnowledge, start: Array, nonlinear: float, tell: Any
                     ) -> list[tuple[DriveSpectra, LearnedCar]]:
     """Each drive, or each group of many, with the car of the others. CheckFailed where one is of another car than the
-    rest. ``unlike``: logarithm of how many times likelier another car on rough roads than on smooth ones is than one:
-    it explains drives that differ."""
+    rest. ``nonlinear``: logarithm of how many times likelier than a linear car one is that depends on how fast its
+    suspensions move: it explains drives that differ."""
     groups: list[list[_Used]] = []
     most = -(-sum(len(one.spectra) for one in used) // _MOST_GROUPS)
     for one in used:
@@ -326,7 +334,7 @@ def _checked_drives(used: Sequence[_Used], knowledge: CarKnowledge, start: Array
         found.append((own.log_evidence + rest.log_evidence, group, others, spectra, own, rest))
     evidence, group, others, _, own, rest = max(found, key=lambda one: one[0])
     one_car = UnknownCar(joined([one.spectra for one in used]), loose).fit_from(start)
-    if evidence - one_car.log_evidence > max(_TWO_CARS, unlike):
+    if evidence - one_car.log_evidence > max(_TWO_CARS, nonlinear):
         name = _most_apart(own, rest, _COMPARED)
         those = "this drive is" if len(group) == 1 else f"this and the {len(group) - 1} drives after it are"
         as_what = "the others" if len(others) > 1 else others[0].name
@@ -347,7 +355,7 @@ def _value(car: LearnedCar, name: str) -> str:
 _WORDS = {"bounce_hz": ("body bounce", "Hz"), "damping_ratio": ("damping ratio", ""), "hop_hz": ("wheel hop", "Hz"),
           "unsprung_to_sprung": ("unsprung / sprung mass", ""), "rear_share": ("share of weight on the rear axle", ""),
           "dynamic_index": ("dynamic index of pitch", ""), "wheelbase_m": ("wheelbase", "m"),
-          "contact_patch_m": ("contact patch", "m"), "ahead_m": ("ahead of the middle", "m"), "noise": ("noise", "")}
+          "contact_patch_m": ("contact patch", "m")}
 """Of each coordinate the words and the unit."""
 
 
@@ -387,7 +395,8 @@ def _answer(question: LearnCarQuestion, used: Sequence[_Used], problem: UnknownC
                  for x, covariance in ((car.x, car.covariance), (knowledge.mean, knowledge.covariance)))
     mass = USUAL_MASS_KG if question.mass_kg is None else _sprung_side_kg(question.mass_kg, car.x)
     vehicle = knowledge.car(car.x, mass, "learned-car")
-    model = Model(vehicle, errors=_number_errors(knowledge, car, mass))
+    model = Model(vehicle, errors=number_errors(
+        lambda x: knowledge.car(x, mass, ""), car.x, car.covariance))
     shown = [*NUMBERS, "wheelbase_m"]
     values = {name: _shown(name, float(car.x[at])) for at, name in enumerate(shown)}
     deviations = {name: _slope(name, values[name]) * float(car.std[at]) for at, name in enumerate(shown)}
@@ -438,19 +447,6 @@ def _sprung_side_kg(mass_kg: float, x: Array) -> float:
     return mass_kg / 2 / (1 + ratios[0] * (1 - share) + ratios[1] * share)
 
 
-def _number_errors(knowledge: CarKnowledge, car: LearnedCar, mass: float) -> Any:
-    """Errors of the numbers of the vehicle's file, that of the common scale left out."""
-    vehicle = knowledge.car(car.x, mass, "")
-    names = [one for one in sized(vehicle) if one != "sprung_mass_kg"]
-    if vehicle.sensor.ahead_m:
-        names.append("sensor.ahead_m")
-    slopes = np.zeros((len(names), len(car.x)))
-    for at in range(len(car.x) - 1):
-        low, high = (knowledge.car(_moved(car.x, at, step), mass, "") for step in (-1e-4, 1e-4))
-        slopes[:, at] = [(read(high, name) - read(low, name)) / 2e-4 for name in names]
-    return NumberErrors.of_covariance(names, slopes @ car.covariance @ slopes.T)
-
-
 # --- words ---
 
 
@@ -474,8 +470,7 @@ def _iri_blocks(now: Mapping[float, float], ever: Mapping[float, float]) -> list
         Section("Standard error of the IRI because of the car [%]", [
             Table(("at km/h", *(f"{3.6 * speed:.0f}" for speed in now)), [
                 ("any car of this wheelbase", *(f"{100 * value:.0f}" for value in ever.values())),
-                ("this car", *(f"{100 * value:.1f}" for value in now.values()))])]),
-        Hint("It includes dampers up to twice as hard in rebound as in compression, which such drives do not show.")]
+                ("this car", *(f"{100 * value:.1f}" for value in now.values()))])])]
 
 
 def _kept_lines(errors: Mapping[str, Any]) -> Iterator[str]:

@@ -22,14 +22,12 @@ from functools import cached_property, lru_cache, partial
 
 import numpy as np
 
-from logger.arrays import Array, Bools
+from logger.arrays import Array, Bools, Complex
 from logger.estimation.car_response import HIGHEST_HZ, WAVE_NUMBER_STEPS_CPM, WAVE_NUMBERS_CPM, golden_car_slope
 from logger.estimation.drive_spectra import INDEPENDENT, DriveSpectra, counts, expected, grid_hz, middles_hz
 from logger.estimation.road_spectrum import PIVOT_CPM
-from logger.vehicle.linear_car import LinearCar, frequency_response
-from logger.vehicle.models import half_car
+from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.published_cars import NUMBERS, CarPrior, car_of, published_prior, share_of
-from logger.vehicle.structure import body_point
 from logger.vehicle.vehicle import SensorPlace, Vehicle
 
 WAVINESS, WAVINESS_APART, WAVINESS_WITHIN = 2.0, 0.3, 0.2
@@ -48,12 +46,6 @@ _STEP = 1e-4  # of differences that derivatives are taken by
 _MOST_ROUNDS, _MOST_HALVINGS, _MOST_INNER, _SMALL_GAIN, _SMALL_MOVE = 60, 8, 12, 1e-3, 1e-4
 _NEIGHBOURS = 10  # blocks: 20 s
 _HOPS_APART = 0.15  # of the logarithm
-_HARMONICS_HZ = 18.0
-"""Twice the hop of a slow wheel: above it a body answers the harmonics of forces that are no straight line. Dampers
-twice as hard in rebound change the power below it by 1 to 9 %, above it up to threefold. With bands to 30 Hz such
-dampers made the IRI of eight simulated cars 9 % wrong (r.m.s. at 70 mph), to 22 Hz 5 %, to 18 Hz 3.4 %; linear cars had
-3 % each time.
-"""
 _ALIKE = 0.1  # of logarithms of evidence: a search stops where a round gains less than a hundredth of it
 _LONGEST_STEP = 0.3  # of a coordinate in a round
 _PRECISION = np.array([_LEVEL_APART**-2, WAVINESS_WITHIN**-2])
@@ -66,9 +58,14 @@ _HOLE_SIGMA, _SIEVES = 1.5, 2
 a kilometre the mean bias of an IRI fell from 2.7 to 2.0 % at 10 mph and from 1.4 to 0.7 % at 70 mph; 2.5 changed
 nothing."""
 
-EXTRA = ("wheelbase_m", "sensor.ahead_m", "noise")
-"""Coordinates behind those of ``NUMBERS``: logarithm, length [m], logarithm of the noise over what is known of it."""
+EXTRA = ("wheelbase_m", "sensor.ahead_m", "dampers.unevenness", "noise")
+"""Coordinates behind those of ``NUMBERS``: logarithm, length [m], difference of a damper's slopes in rebound and
+compression over their sum, logarithm of the noise over what is known of it."""
+_UNEVENNESS = 0.25
+"""Mean and standard deviation: from even dampers to ratios of 3, of which 2 to 3 are usual (J. C. Dixon, The Shock
+Absorber Handbook, 2007, chapter 1)."""
 COORDINATES = (*NUMBERS, *EXTRA)
+_UNEVEN_AT = COORDINATES.index("dampers.unevenness")
 
 
 @dataclass(frozen=True)
@@ -92,14 +89,15 @@ class CarKnowledge:
         """Of all coordinates (p,)."""
         share = share_of(self.prior.mean[NUMBERS.index("rear_share")])
         ahead_m = (0.5 - share) * self.wheelbase_m if self.ahead_m is None else self.ahead_m
-        return np.concatenate([self.prior.mean, [np.log(self.wheelbase_m), ahead_m, 0.0]])
+        return np.concatenate([self.prior.mean, [np.log(self.wheelbase_m), ahead_m, _UNEVENNESS, 0.0]])
 
     @cached_property
     def precision(self) -> Array:
         """Of all coordinates (p, p)."""
         own, whole = len(NUMBERS), np.zeros((len(NUMBERS) + len(EXTRA),) * 2)
         whole[:own, :own] = np.linalg.inv(self.prior.covariance)
-        whole[own:, own:] = np.diag([self.wheelbase_std**-2, self.ahead_std_m**-2, _NOISE_APART**-2])
+        whole[own:, own:] = np.diag([
+            self.wheelbase_std**-2, self.ahead_std_m**-2, _UNEVENNESS**-2, _NOISE_APART**-2])
         return whole
 
     @cached_property
@@ -131,6 +129,35 @@ def interference(n_cpm: Array, spread: Array, behind_m: float) -> tuple[Array, A
 def road_under(n_cpm: Array, speed_mps: Array, contact_patch_m: float) -> Array:
     """Spectrum over time (s, f) of what the patch makes of a road of waviness 2 and level 1 [1/Hz per m3]."""
     return np.asarray(np.sinc(n_cpm * contact_patch_m) ** 2 * (n_cpm / PIVOT_CPM) ** -WAVINESS / speed_mps[:, None])
+
+
+def own_rates(car: LinearCar, f_hz: Array) -> Complex:
+    """Rate of each suspension per elevation under its own wheel (w, 1, f) [1/s]."""
+    return np.asarray(2j * np.pi * f_hz * np.einsum("fww->wf", car.travel_by_wheel(f_hz))[:, None])
+
+
+def _products(of_axles: Complex) -> Complex:
+    """Squares of two signals (2, ...) and the first times the conjugate of the second (3, ...)."""
+    return np.asarray(of_axles[[0, 1, 0]] * of_axles[[0, 1, 1]].conj())
+
+
+def sizes(spectra: Complex) -> Complex:
+    """Spectra and cross-spectrum (3, ..., f) of |v| of two Gaussian signals v that have these, at frequencies that are
+    multiples of the first.
+
+    A damper with slopes c (1 + u) in rebound and c (1 - u) in compression is an even one and a force u c |v|. Where v
+    have deviations s and t and a correlation r the covariance of |v| is s t (2 / pi) (sqrt(1 - r2) + r asin r - 1)
+    (A. Papoulis, Probability, Random Variables, and Stochastic Processes, 3rd ed., 1991, 10.3), of which r2 / 2 and
+    r4 / 24, the first terms of the series in brackets, are 95 % and more. Wheels hop in a narrow band, so that it lies
+    at twice their hop and near zero.
+    """
+    fine = 3  # times the frequencies that there are: squares do not fold back on them
+    covariance = np.fft.irfft(np.insert(spectra, 0, 0.0, axis=-1), fine * spectra.shape[-1])
+    one, other = covariance[:2, ..., :1]
+    scale = np.stack([one * one, other * other, one * other])
+    square = covariance**2 / scale
+    of_sizes = np.sqrt(scale) / np.pi * square * (1 + square / 12)
+    return np.asarray(np.fft.rfft(of_sizes)[..., 1:spectra.shape[-1] + 1])
 
 
 @dataclass(eq=False)
@@ -174,7 +201,7 @@ class UnknownCar:
         self.spread = np.sqrt(np.bincount(self.speed, spectra.spread**2) / each + within
                               + (_RECEIVER_MPS / self.speed_mps) ** 2)
         self.slope = -np.log(middles_hz() / spectra.speed_mps[:, None] / PIVOT_CPM)
-        seen = np.isfinite(spectra.power) & (middles_hz() < _HARMONICS_HZ)
+        seen = np.isfinite(spectra.power)
         self.weight = np.where(seen, INDEPENDENT * counts(), 0.0)
         self.power = np.where(seen, spectra.power, 1.0)
         self.noise = np.where(np.isfinite(spectra.noise), np.maximum(spectra.noise, _LEAST_NOISE), _LEAST_NOISE)
@@ -187,13 +214,14 @@ class UnknownCar:
     def gains(self, x: Array) -> Array:
         """Expected power of each band (s, k) per level Gd(0.2 cycle/m) of a road of waviness 2, at the drives' speeds.
         """
-        vehicle = self.knowledge.car(x, 1.0, "")
-        structure = half_car(vehicle)
-        point = [body_point(structure, vehicle.sensor.ahead_m)]
-        front, rear = frequency_response(structure, point, grid_hz())[:, 0, :].T
-        both, (even, odd) = front * rear.conj(), self._interference(float(structure.behind_m.max()))
-        power = np.abs(front) ** 2 + np.abs(rear) ** 2 + even * both.real - odd * both.imag
-        return np.asarray((power * self._road_under(structure.contact_patch_m)) @ expected().T)
+        car = LinearCar.of(self.knowledge.car(x, 1.0, ""))
+        structure = car.structure
+        road = self._road_under(structure.contact_patch_m)
+        forces = car.by_force(grid_hz()).T[:, None] * structure.dampers[:, None, None] * x[_UNEVEN_AT]
+        front, rear, both = (_products(car.by_wheel(grid_hz()).T[:, None]) * road
+                             + _products(forces) * sizes(_products(own_rates(car, grid_hz())) * road))
+        even, odd = self._interference(float(structure.behind_m.max()))
+        return np.asarray((front.real + rear.real + even * both.real - odd * both.imag) @ expected().T)
 
     def expected_power(self, x: Array, roads: BlockRoads) -> tuple[Array, Array]:
         """Of the road and of the noise, (b, k) and (b, 1)."""
@@ -303,11 +331,16 @@ class UnknownCar:
         score = (self.weight * (self.power / whole - 1) * rest).sum(axis=1)
         return np.asarray(score > _HOLE_SIGMA * np.sqrt((self.weight * rest * hole).sum(axis=1)))
 
-    def by_level(self, car: LearnedCar) -> tuple[LearnedCar, LearnedCar]:
-        """The car of the rougher and of the smoother half of all blocks: of a linear car they agree."""
-        rough = car.roads.level > np.median(car.roads.level)
-        one, other = (UnknownCar(self.spectra.part(half), self.knowledge).fit_from(car.x) for half in (rough, ~rough))
-        return one, other
+    def by_motion(self, car: LearnedCar, over: Array) -> tuple[tuple[LearnedCar, LearnedCar], float]:
+        """The car of the blocks in which its suspensions move faster (``motion``) than ``over`` (b,), that of the
+        others, and the logarithm of how many times likelier one car is than these two (a linear one is)."""
+        fast = self.motion(car) > over
+        one, other = (UnknownCar(self.spectra.part(half), self.knowledge).fit_from(car.x) for half in (fast, ~fast))
+        return (one, other), car.log_evidence - one.log_evidence - other.log_evidence
+
+    def motion(self, car: LearnedCar) -> Array:
+        """How fast the suspensions move in each block (b,), up to a factor of the car: root of level times speed."""
+        return np.asarray(np.sqrt(np.exp(car.roads.level) * self.spectra.speed_mps))
 
     def learn(self) -> tuple[UnknownCar, LearnedCar]:
         """The car, and the problem without the blocks that are impulsive with it: which those are follows from the car,

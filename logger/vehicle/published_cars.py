@@ -12,7 +12,7 @@ and what sets them apart are counted on their own.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 
@@ -144,16 +144,19 @@ def generic_car(wheelbase_m: float | None = None, mass_kg: float | None = None) 
     usual = vehicle(mean)
     whole_kg = 2 * (USUAL_MASS_KG + sum(one.unsprung_mass_kg for one in (usual.front, usual.rear) if one is not None))
     car = usual if mass_kg is None else vehicle(mean, USUAL_MASS_KG * mass_kg / whole_kg)
-    names = [name for name in sized(car) if name != "sprung_mass_kg"]
+    return car, number_errors(lambda at: vehicle(at, car.sprung_mass_kg), mean, covariance)
 
-    def logarithms(at: Array) -> Array:
-        moved = vehicle(at)
-        return np.log([read(moved, name) for name in names])
 
-    steps = _STEP * np.eye(len(mean))
-    slopes = np.array([logarithms(mean + step) - logarithms(mean - step) for step in steps]).T / (2 * _STEP)
-    values = np.array([read(car, name) for name in names])
-    return car, NumberErrors.of_covariance(names, slopes @ covariance @ slopes.T * np.outer(values, values))
+def number_errors(vehicle_at: Callable[[Array], Vehicle], at: Array, covariance: Array) -> NumberErrors:
+    """Errors of the numbers of a vehicle's file out of the covariance (p, p) of coordinates (p,). The sensor's place is
+    one of them where it is not at the centre of gravity. ``vehicle_at``: the vehicle with such coordinates, all of one
+    sprung mass."""
+    names = [name for name in sized(vehicle_at(at)) if name != "sprung_mass_kg"]
+    if vehicle_at(at).sensor.ahead_m:
+        names.append("sensor.ahead_m")
+    ends = ((vehicle_at(at + step), vehicle_at(at - step)) for step in _STEP * np.eye(len(at)))
+    slopes = np.array([[read(high, name) - read(low, name) for name in names] for high, low in ends]).T / (2 * _STEP)
+    return NumberErrors.of_covariance(names, slopes @ covariance @ slopes.T)
 
 
 def _of_half_car(mass: float, inertia: float, front_m: float, rear_m: float, front: Sequence[float],

@@ -55,7 +55,8 @@ def truth(car: UnmeasuredCar) -> np.ndarray:
     """Coordinates of ``unknown_car`` (p,)."""
     share = car.rear_share
     return np.concatenate([np.log([*car.front, *car.rear, car.dynamic_index]), [
-        np.log(share / (1 - share)), np.log(car.patch_m), np.log(car.wheelbase_m), ahead_of_middle_m(car), 0.0]])
+        np.log(share / (1 - share)), np.log(car.patch_m), np.log(car.wheelbase_m), ahead_of_middle_m(car),
+        (car.rebound - 1) / (car.rebound + 1), 0.0]])
 
 
 def ahead_of_middle_m(car: UnmeasuredCar) -> float:
@@ -68,7 +69,7 @@ def coordinates(vehicle: Vehicle) -> np.ndarray:
     assert vehicle.rear is not None
     wheelbase_m = vehicle.front.cg_distance_m + vehicle.rear.cg_distance_m
     ahead_m = vehicle.sensor.ahead_m + wheelbase_m / 2 - vehicle.front.cg_distance_m
-    return np.concatenate([coordinates_of(vehicle), [np.log(wheelbase_m), ahead_m, 0.0]])
+    return np.concatenate([coordinates_of(vehicle), [np.log(wheelbase_m), ahead_m, 0.0, 0.0]])
 
 
 def biases(x: np.ndarray, car: UnmeasuredCar, noise: float) -> np.ndarray:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from logger.vehicle.uncertain import cars_off
 
 from ..support.command import called
 from ..support.drives.logged_rows import ROW
-from ..support.drives.unmeasured_car import MPH, UnmeasuredCar, driven, mixed, written
+from ..support.drives.unmeasured_car import FINE_SENSOR, MPH, UnmeasuredCar, driven, mixed, written
 from ..support.slow import slow
 
 CAR = UnmeasuredCar()
@@ -127,11 +128,34 @@ def test_friction_is_named_and_stays_in_the_errors(learned: tuple[dict[str, Any]
     said, = answer["effects_missing"]
     assert "damping ratio" in said and "as with friction" in said
     end, rough, smooth = re.fullmatch(  # type: ignore[union-attr]
-        r".*: its (\w+) damping ratio is ([\d.]+) .*on rough roads and ([\d.]+) .*on smooth ones.*", said).groups()
+        r".*: its (\w+) damping ratio is ([\d.]+) .*move fast and ([\d.]+) .*move slowly.*", said).groups()
     value, error = (answer[key][f"{end}.damping_ratio"] for key in ("parameters", "standard_errors"))
     low, high = (getattr(car, end)[1] for car in damped)
-    assert low < float(rough) < value < float(smooth) < high and error > (float(smooth) - float(rough)) / 2
+    assert low < float(rough) < value < float(smooth) < high and error > float(smooth) - float(rough)
     assert learned[0]["effects_missing"] == []
+
+
+def test_uneven_dampers_are_named_with_their_ratio(learned: tuple[dict[str, Any], Path, Path], tmp_path: Path) -> None:
+    """By the harmonics of the wheels' hop, of forces that follow by equations of their own."""
+    rng = np.random.default_rng(3)
+    drives = [driven(replace(CAR, rebound=2.0), rng, 2 * SECONDS, mph * MPH, 2.0, 4.0, FINE_SENSOR)
+              for mph in (20, 35, 60)]
+    found = called("learn-car", *written(tmp_path, drives, FINE_SENSOR), "--wheelbase", 2.66, "--json")
+    said, = json.loads(found.stdout)["effects_missing"]
+    ratio, error = map(float, re.findall(r"[\d.]+", said)[:2])
+    assert "Dampers are uneven" in said and abs(ratio - 2.0) < 3 * error < 1.0
+    assert learned[0]["effects_missing"] == []
+
+
+@pytest.mark.slow
+def test_two_cars_are_no_nonlinear_one_where_each_has_its_own_roads(tmp_path: Path) -> None:
+    """One drives smooth roads only, the other rough ones only."""
+    rng = np.random.default_rng(21)
+    other = UnmeasuredCar(2.66, 0.4, (1.5, 0.4, 12.8, 0.1), (1.6, 0.35, 12.6, 0.12))
+    drives = [driven(car, rng, 2 * SECONDS, mps, 2.0, iri) for car, iri in ((CAR, 0.8), (other, 10.0))
+              for mps in (20 * MPH, 50 * MPH)]
+    found = called("learn-car", *written(tmp_path, drives), "--wheelbase", 2.66)
+    assert found.returncode == 1 and "not from the same car" in found.stderr
 
 
 @pytest.mark.slow
