@@ -552,15 +552,20 @@ def _more(drive: Drive, part: slice) -> Array:
 
 
 def thinned_runs(runs: Sequence[Run], vehicle: Vehicle | None = None) -> list[Run]:
-    """Runs of one rate, of about 100 samples a second, or as many as the ``vehicle`` or the band of a rig's readings
-    needs, if they had many more. What is thinned is no longer rounded; a sample is as usable as the least of those
-    beside it.
+    """Runs of one rate, of about 100 samples a second, or as many as the ``vehicle`` needs, and on a rig what it lacks,
+    if they had many more. What is thinned is no longer rounded; a sample is as usable as the least of those beside it.
 
     Little of a car's motion lies where the recorder's filter begins; what jerks a rig of little mass is there as well,
     so that its record goes through the filter that its model goes through.
     """
-    needed_hz = max(_needed_hz(vehicle), *(occupied_hz(one) / HIGHEST_OF_RATE for one in runs if one.timed), 0.0)
-    factor = int(runs[0].rate_hz / needed_hz + _NEARLY)
+    def factor_to(needed_hz: float) -> int:
+        return int(runs[0].rate_hz / needed_hz + _NEARLY)
+
+    factor = factor_to(_needed_hz(vehicle))
+    if factor > 1 and vehicle is not None and runs[0].timed:
+        predictions = SimulatedRuns(runs, steps_hz(vehicle)).predict(compose(vehicle, []))
+        lacks_hz = max(unexplained_up_to_hz(run, run.main(one)) for run, one in zip(runs, predictions, strict=True))
+        factor = min(factor, max(factor_to(lacks_hz / HIGHEST_OF_RATE), 1))
     if factor < 2:
         return list(runs)
 
@@ -574,16 +579,17 @@ def thinned_runs(runs: Sequence[Run], vehicle: Vehicle | None = None) -> list[Ru
             for one in runs]
 
 
-def occupied_hz(run: Run) -> float:
-    """The bandwidth that a run's readings occupy: what lies above it has less than a per cent of their power (ITU-R
-    SM.328), that of the quietest of 20 bands taken for noise. A part of a rig that its model lacks may swing above all
-    that the model has."""
+def unexplained_up_to_hz(run: Run, prediction: Array) -> float:
+    """The frequency above which a prediction (n,) leaves less than a per cent of the power that was measured: the share
+    that ITU-R SM.328 leaves out of an occupied bandwidth. The quietest of 20 bands of the residual is noise. A part of
+    a rig that its model lacks may swing above all that the model has."""
     from scipy.signal import welch
 
-    f_hz, density = welch(run.measured_mps2, run.rate_hz, nperseg=min(run.count, int(BLOCK_S * run.rate_hz)))
-    noise = min(band.mean() for band in np.array_split(density, 20))
-    power = np.cumsum(density - noise)
-    return float(f_hz[np.argmax(power >= 0.99 * power[-1])])
+    f_hz, density = welch(np.stack([run.measured_mps2, run.measured_mps2 - prediction]), run.rate_hz,
+                          nperseg=min(run.count, int(BLOCK_S * run.rate_hz)))
+    noise = min(band.mean() for band in np.array_split(density[1], 20))
+    above = np.cumsum((density[1] - noise)[::-1])[::-1]
+    return float(max(f_hz[above > 0.01 * density[0].sum()], default=f_hz[1]))
 
 
 def _thinned_marks(usable: Array | None, factor: int) -> Array | None:
