@@ -268,7 +268,10 @@ def _uneven_dampers(car: LearnedCar) -> Iterator[str]:
     """What is said where the wheels' hop has the harmonics of uneven dampers."""
     at = COORDINATES.index("dampers.unevenness")
     uneven, std = abs(float(car.x[at])), float(car.std[at])
-    if uneven > _SIGMA * std:
+    if uneven > _SIGMA * std and uneven >= 1:  # such a damper would push the wheel on
+        yield ("The wheel hop has stronger harmonics than dampers that resist one way only would cause. A measured "
+               "street and ridelog diagnose may show what causes them.")
+    elif uneven > _SIGMA * std:
         yield (f"Dampers are uneven: {(1 + uneven) / (1 - uneven):.2g} ± {2 * std / (1 - uneven) ** 2:.1g} times as "
                "hard one way as the other. A measured street and ridelog diagnose show which way (damper_asymmetry).")
 

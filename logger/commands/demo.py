@@ -35,6 +35,7 @@ from logger.report.quantities import columns, wrapped
 if TYPE_CHECKING:
     from logger.api.extraction import Extracted
     from logger.api.lab.loop import Say
+    from logger.chart_data import Curves
     from logger.estimation.batch import Assessment
     from logger.lab.session import Story
 
@@ -388,24 +389,28 @@ def _judged(folder: Path, vehicle: str, title: str, why: str, commands: _Command
 
 
 def _write_page(file: Path, out: Path, story: Story, before: Assessment, after: Assessment, sentence: str) -> None:
-    from logger.api.extraction import RATE_HZ
     from logger.api.lab.loop import field_page
+
+    write_text(file, field_page(f"{FIELD.vehicle}: four drives, and what was missing", _ABOUT, ways(out), story, before,
+                                after, [sentence.partition(" Difference")[0]]))
+
+
+def ways(out: Path) -> Curves:
+    """A map of the measured lines, and of the drives: a place a second."""
+    from logger.api.extraction import RATE_HZ
     from logger.chart_data import Curves, Line
     from logger.geodesy import east_and_north_m
     from logger.store.formats.drive_file import DRIVE, PLACE, read_columns
     from logger.store.formats.profile_file import read_places
 
-    drives = (*DRIVES, FOURTH)
-    places = {name: read_places(out / name)[1:] for name in (LINE, BEYOND)}
-    for name in drives:
+    places = {name: list(read_places(out / name)[1:]) for name in (LINE, BEYOND)}
+    for name in (*DRIVES, FOURTH):
         _, columns = read_columns(out / RUNS / name / DRIVE)
-        places[name] = columns[PLACE[0]], columns[PLACE[1]]
-    every, (lat0_deg, lon0_deg) = round(RATE_HZ), (float(one[0]) for one in places[LINE])
-    ways = Curves("The drives", "east [m]", "north [m]", tuple(
-        Line(name, *east_and_north_m(lat_deg[::every], lon_deg[::every], lat0_deg, lon0_deg), dots=name in drives)
+        places[name] = [columns[one][::round(RATE_HZ)] for one in PLACE]
+    lat0_deg, lon0_deg = (float(one[0]) for one in places[LINE])
+    return Curves("The drives", "east [m]", "north [m]", tuple(
+        Line(name, *east_and_north_m(lat_deg, lon_deg, lat0_deg, lon0_deg), dots=name not in (LINE, BEYOND))
         for name, (lat_deg, lon_deg) in places.items()), equal=True)
-    write_text(file, field_page(f"{FIELD.vehicle}: four drives, and what was missing", _ABOUT, ways, story, before,
-                                after, [sentence.partition(" Difference")[0]]))
 
 
 # --- words ---

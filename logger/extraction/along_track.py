@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from logger.arrays import Array
 from logger.dsp.repeated_samples import stretches_of
-from logger.geodesy import EARTH_RADIUS_M
+from logger.geodesy import east_and_north_m
 from logger.lab.likelihood.lag import SLOWEST_MPS, lags, offset_by_correlation_m
 from logger.profiles.track import Track
 from logger.runs import RECEIVER_ERROR_LASTS_S, Run
@@ -50,7 +50,7 @@ class MeasuredLine:
             raise ValueError("expected two places or more")
         if not (np.diff(distance_m) > 0).all():
             raise ValueError("expected distances that increase from place to place")
-        east_m, north_m = _flat(lat_deg, lon_deg, float(lat_deg[0]), float(lon_deg[0]))
+        east_m, north_m = east_and_north_m(lat_deg, lon_deg, float(lat_deg[0]), float(lon_deg[0]))
         apart_m, ahead_m = np.hypot(np.diff(east_m), np.diff(north_m)), np.diff(distance_m)
         if (far := apart_m > (1 + _MORE) * ahead_m + _PLACE_M).any():
             at = int(np.argmax(far))
@@ -65,7 +65,7 @@ class MeasuredLine:
         """The distance of the place nearest to positions (k,), and how far aside they are, both (k,) [m]."""
         from scipy.spatial import cKDTree
 
-        east_m, north_m = _flat(lat_deg, lon_deg, self.lat_deg, self.lon_deg)
+        east_m, north_m = east_and_north_m(lat_deg, lon_deg, self.lat_deg, self.lon_deg)
         length_m = np.concatenate([[0.0], np.cumsum(np.hypot(np.diff(self.east_m), np.diff(self.north_m)))])
         dense_m = np.linspace(0.0, length_m[-1], max(2, round(length_m[-1] / _SPACING_M)))
         spots = np.stack([np.interp(dense_m, length_m, one) for one in (self.east_m, self.north_m)], axis=1)
@@ -100,13 +100,6 @@ def passes(driven_m: Array, along_m: Array, aside_m: Array) -> list[Pass]:
         if last - first + 1 >= _LEAST_FIXES and moved > 2 * _APART_M and np.ptp(offset_m[first : last + 1]) < moved / 2:
             found.append(Pass(int(first), int(last) + 1, float(np.median(offset_m[first : last + 1]))))
     return found
-
-
-def _flat(lat_deg: Array, lon_deg: Array, lat0_deg: float, lon0_deg: float) -> tuple[Array, Array]:
-    """How far east and north of a near place others (k,) lie [m]."""
-    east_deg = (lon_deg - lon0_deg + 180.0) % 360.0 - 180.0
-    return (EARTH_RADIUS_M * np.radians(east_deg) * np.cos(np.radians(lat0_deg)),
-            EARTH_RADIUS_M * np.radians(lat_deg - lat0_deg))
 
 
 Ints = npt.NDArray[np.intp]

@@ -587,7 +587,7 @@ def unexplained_up_to_hz(run: Run, prediction: Array) -> float:
 
     f_hz, density = welch(np.stack([run.measured_mps2, run.measured_mps2 - prediction]), run.rate_hz,
                           nperseg=min(run.count, int(BLOCK_S * run.rate_hz)))
-    noise = min(band.mean() for band in np.array_split(density[1], 20))
+    noise = min(band.mean() for band in np.array_split(density[1], min(20, len(f_hz))))
     above = np.cumsum((density[1] - noise)[::-1])[::-1]
     return float(max(f_hz[above > 0.01 * density[0].sum()], default=f_hz[1]))
 
