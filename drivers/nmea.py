@@ -260,8 +260,8 @@ class NmeaDecoder:
             if self._fixes_without[what] >= TELLING_FIXES:
                 return f"it sends {self._recent.sentence_kinds()}, but no {what}, so {harm}: have it send {sentences}"
         if len(self._long_intervals_us) == TELLING_INTERVALS:
-            return (f"it sends only each {min(self._long_intervals_us) / US_PER_S:.0f} s, too seldom to know the "
-                    "motion in between, so rows have no place: have it send RMC each second")
+            return (f"it sends only every {min(self._long_intervals_us) / US_PER_S:.0f} s, too seldom to know the "
+                    "motion in between, so rows have no position: have it send RMC every second")
         if self._too_early_us is None:
             return ""
         day = self._too_early_us // DAY_US

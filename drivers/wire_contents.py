@@ -274,7 +274,7 @@ def _form_of_numbers(lines: list[bytes]) -> str:
         return f"three numbers up to {largest:g}, too large for a sample in this profile's unit and range"
     more = f"{count} numbers"
     if count > 3 and len(same) > 2 and all(a[0] < b[0] for a, b in pairwise(same)):
-        more += ", the first of which grows as a time does,"
+        more += ", the first of which grows like a time,"
     if any(letter.isalpha() for letter in text):
         return f"{more} with words beside them"
     between = [name for sign, name in ((";", "semicolons"), ("\t", "tabs"), (",", "commas")) if sign in text]
@@ -297,8 +297,8 @@ _DAMAGED = ("{what} sentences have a wrong checksum{shown}, so they are damaged 
             "length of the cable, and that no other device is on this port")
 
 ADVICE = {
-    (RECEIVER, "sentences"): "it sends {what}{shown}, but ridelog takes places only from RMC, GGA and GLL: have it "
-                             "send RMC, which has time, date, place and speed in one sentence",
+    (RECEIVER, "sentences"): "it sends {what}{shown}, but ridelog takes positions only from RMC, GGA and GLL: have it "
+                             "send RMC, which has time, date, position and speed in one sentence",
     (RECEIVER, "no_checksum"): "its sentences ({what}) come without a checksum{shown}, so ridelog ignores them, as "
                                "damage would go unnoticed: switch the checksum on in the receiver",
     (RECEIVER, "damaged"): _DAMAGED,

@@ -36,7 +36,7 @@ class ScaleCalibration:
 
     def __post_init__(self) -> None:
         if not all(1 <= abs(one - zero) < inf for zero, one in zip(self.zero_g_raw, self.one_g_raw, strict=True)):
-            raise SettingsError("calibration: expected a count or more between 0 g and 1 g on every axis")
+            raise SettingsError("calibration: expected at least one count between 0 g and 1 g on every axis")
 
     @property
     def mps2_per_count(self) -> Triple:

@@ -140,7 +140,7 @@ class Installation:
         if path.is_symlink() and path.readlink() == target:
             return InstallationStep(f"keep {path}: it is there")
         if not self._is_ours(name, target):
-            return InstallationStep(f"keep {path}: it is not ours")
+            return InstallationStep(f"keep {path}: ridelog did not make it")
         if path.is_symlink():
             return InstallationStep(f"link {path} to {target}, no longer to {path.readlink()}",
                                     lambda: _make_link(path, target))
@@ -150,7 +150,7 @@ class Installation:
         path = self._place(name)
         if path.is_symlink() and self._is_ours(name, target):
             return InstallationStep(f"remove {path}", path.unlink)
-        return InstallationStep(f"keep {path}: it is not ours" if path.is_symlink() or path.exists() else
+        return InstallationStep(f"keep {path}: ridelog did not make it" if path.is_symlink() or path.exists() else
                                 f"nothing at {path}")
 
     def _is_ours(self, name: str, target: Path) -> bool:

@@ -264,7 +264,7 @@ def _location(beside: list[Header], acceleration: LoggerTable, known: list[tuple
         return acceleration
     able = [one for one in known if one[1].has_location and "t" in one[1].columns]
     if len(able) > 1:
-        raise BadInput(f"{able[0][0].path.parent}: expected one file with speed and place, found "
+        raise BadInput(f"{able[0][0].path.parent}: expected one file with speed and position, found "
                        f"{' and '.join(one[0].path.name for one in able)}: give one of them as --location")
     return read_table(*able[0]) if able else None
 
@@ -525,10 +525,10 @@ def check_speed(table: LoggerTable, fixes: Fixes) -> None:
         return
     ratio = way_over_speed(fixes.time_s, fixes.lat_deg, fixes.lon_deg, fixes.speed_mps)
     if ratio is not None:
-        raise BadInput(f"{table.header.path}: expected a speed in {table.unit('speed')} that agrees with the places, "
-                       f"found places {ratio:.2g} times as far apart. Name its unit in --columns, speed="
+        raise BadInput(f"{table.header.path}: expected a speed in {table.unit('speed')} that agrees with the positions"
+                       f", found positions {ratio:.2g} times as far apart. Name its unit in --columns, speed="
                        f"{table.known.columns['speed'].header}:UNIT, one of {', '.join(SPEED_UNITS)}; or name t and "
-                       "speed alone, to go without the places")
+                       "speed alone, to go without positions")
 
 
 def receiver_of(config: Config, even: EvenSamples, fixes: Fixes, learns: bool) -> CarriedDelay:

@@ -241,7 +241,7 @@ class ModesQuestion(Question):
         "a vehicle", metavar="NAME", choices=MODAL_METHODS, check=_check_method)] = None
     _: KW_ONLY
     columns: Annotated[Sequence[str] | None, Option(
-        "columns of the sensors (default: all but t_s, the input, and a drive's speed, distance and place)",
+        "columns of the sensors (default: all but t_s, the input, and a drive's speed, distance and position)",
         metavar="A,B,...", read=_columns)] = None
     input_column: Annotated[str | None, Option("column of the measured input", metavar="COLUMN", flag="--input")] = None
     from_s: Annotated[float | None, Option("leave out what is before this t_s [s]", metavar="S")] = None

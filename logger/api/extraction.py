@@ -87,7 +87,7 @@ def recorded_dump(dump: Path, given: Config | None, vehicle: str | None, tell: T
     if not len(recorded.readings.time_s) or not recorded.readings.present.any():
         raise BadInput(f"{dump}: expected readings of the accelerometer, found none")
     if len(fixes.time_s) < 2:
-        raise BadInput(f"{dump}: expected fixes with a speed and a place, found {len(kept.fixes)} fixes, of which "
+        raise BadInput(f"{dump}: expected fixes with a speed and a position, found {len(kept.fixes)} fixes, of which "
                        f"{len(fixes.time_s)} have both")
     return recorded
 
@@ -296,7 +296,7 @@ def _make_room(folders: list[Path], source: Path, out: Path) -> None:
                if not one.parent.is_symlink() and read_run_facts(one.parent).source == source.name]
     for folder in folders:
         if folder.is_symlink():
-            raise BadInput(f"{folder}: expected a folder for a run of {source}, found a link to another place: remove "
+            raise BadInput(f"{folder}: expected a folder for a run of {source}, found a symbolic link: remove "
                            "the link")
         if folder not in earlier and folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise BadInput(f"{folder}: expected an empty folder for a run of {source}, found a run of another "

@@ -234,7 +234,7 @@ _ABOUT = (
     "first three drives; the fourth shows whether the lab was right.",
 )
 _EXPLAINED = {
-    "extract": "First, extract turns the bytes into runs. Look at the places: GPS fixes are late and a metre or two "
+    "extract": "First, extract turns the bytes into runs. Look at the positions: GPS fixes are late and a metre or two "
                "off, but the car felt the measured road, and that shows where it was.",
     "before": "What IRI does the box give for the fourth street? Look at the bias, and at the share of windows within "
               "two standard errors (ideal: 95%). On a street that nobody measured, nothing would show the error.",

@@ -45,8 +45,8 @@ class ExtractQuestion(LongQuestion):
     out: Annotated[Path, Option("folder for the runs", metavar="DIR", read=Path)]
     config: Annotated[Path | None, Option("settings of those drives", metavar="FILE", read=Path)] = None
     profile: Annotated[Path | None, Option(
-        "profile of the road that was driven: distance_m,elevation_m[,elevation_right_m],lat_deg,lon_deg; places may "
-        "be empty in most rows", metavar="PROFILE.csv", read=Path)] = None
+        "profile of the road that was driven: distance_m,elevation_m[,elevation_right_m],lat_deg,lon_deg; positions "
+        "may be empty in most rows", metavar="PROFILE.csv", read=Path)] = None
     vehicle: Annotated[str | None, Option(
         "the car whose model recognises the road (default: the one that the settings or the recording name)",
         metavar="NAME|FILE")] = None
@@ -54,7 +54,7 @@ class ExtractQuestion(LongQuestion):
         "recordings of phones and other loggers, in place of DUMP; a folder holds the files of one recording",
         metavar="FILE|FOLDER", read=Path, many=list)] = ()
     location: Annotated[Path | None, Option(
-        "with --csv: the file with the speed or place of the recording, on the same clock", metavar="FILE.csv",
+        "with --csv: the file with the speed or position of the recording, on the same clock", metavar="FILE.csv",
         read=Path)] = None
     columns: Annotated[str | None, Option(
         "with --csv: which columns are what: t (s, ms, us, ns, iso), x y z or up, the acceleration (m/s2, g, mg), gx "
@@ -145,14 +145,14 @@ def lines(source: Path, found: "Extracted") -> list[str]:
         words = f"{one.run}: {one.seconds:.0f} s, {one.metres:.0f} m"
         if one.place_std_m is not None:
             how = "matched to the road" if one.by_road else "by GPS alone: the road was not recognised"
-            words += f" on the profile, places ± {one.place_std_m:.2g} m ({how})"
+            words += f" on the profile, positions ± {one.place_std_m:.2g} m ({how})"
         if one.gaps:
             words += f", {one.gaps} short gaps" if one.gaps > 1 else ", 1 short gap"
         if one.delay_s or one.delay_std_s:
             words += f"; corrected for a GPS delay of {one.delay_s:.2f} ± {one.delay_std_s:.2f} s"
         printed.append(words)
         if (scale := one.unusual_speed_scale) is not None:
-            printed.append(f"{one.run}: taken out: speeds that are {100 * scale[0]:.2f} ± {100 * scale[1]:.2f} % of "
+            printed.append(f"{one.run}: removed: speeds that are {100 * scale[0]:.2f} ± {100 * scale[1]:.2f} % of "
                            "those on the profile; a receiver's are not so far off: is the profile's distance_m right?")
     printed += [f"{source}: {words}" for words in left_out_lines(found.left_out)]
     if found.torn_tail:

@@ -47,17 +47,17 @@ class MeasuredLine:
         """By geographic coordinates (m,) [degrees]. ValueError for fewer than two places, distances that do not grow,
         and places that cannot be so far apart on the ground, or lie much nearer together."""
         if len(distance_m) < 2:
-            raise ValueError("expected two places or more")
+            raise ValueError("expected two positions or more")
         if not (np.diff(distance_m) > 0).all():
-            raise ValueError("expected distances that increase from place to place")
+            raise ValueError("expected distances that increase from position to position")
         east_m, north_m = east_and_north_m(lat_deg, lon_deg, float(lat_deg[0]), float(lon_deg[0]))
         apart_m, ahead_m = np.hypot(np.diff(east_m), np.diff(north_m)), np.diff(distance_m)
         if (far := apart_m > (1 + _MORE) * ahead_m + _PLACE_M).any():
             at = int(np.argmax(far))
-            raise ValueError(f"expected places no farther apart than their distances, found {apart_m[at]:.0f} m "
+            raise ValueError(f"expected positions no farther apart than their distances, found {apart_m[at]:.0f} m "
                              f"between those at {distance_m[at]:g} and {distance_m[at + 1]:g} m")
         if apart_m.sum() < _LESS * ahead_m.sum() - _PLACE_M:
-            raise ValueError(f"expected places {ahead_m.sum():.0f} m apart in all, as the distances are, found "
+            raise ValueError(f"expected positions {ahead_m.sum():.0f} m apart in all, as the distances are, found "
                              f"{apart_m.sum():.0f} m")
         return MeasuredLine(distance_m, east_m, north_m, float(lat_deg[0]), float(lon_deg[0]))
 

@@ -64,7 +64,7 @@ FLAG_MEANINGS: Mapping[str, str] = {
     "frozen": "the readings of the accelerometer had not changed for half a minute of driving: no figures",
     "repeated": "the accelerometer, or its bridge, sent each sample more than once: no figures",
     "gps_late": "the GPS line was full and the fixes waited: place, speed and time may be seconds late",
-    "speed_doubtful": "the speed and the places of the GPS disagree: no IRI",
+    "speed_doubtful": "the GPS's speed and positions disagree: no IRI",
     "slow": "below the speed at which the r.m.s. relation holds",
     "fast": "above the speed at which the r.m.s. relation holds",
     "stationary": "the car stood inside the window; averages leave that time out",

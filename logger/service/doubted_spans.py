@@ -283,9 +283,9 @@ class SpeedCheck:
             if not self._lasts:
                 self.spans.begin(first.t_us, timed.t_us)
             self._lasts = True
-            self._said = (f"its speed and its places disagree: over {lasted_us / US_PER_S:.0f} s the speed makes "
-                          f"{by_speed_m:.0f} m, the places {by_places_m:.0f} m. Such rows have no IRI. Check what the "
-                          "receiver is set to (static navigation, simulator, the sentences it sends), or replace it")
+            self._said = (f"its speed and positions disagree: over {lasted_us / US_PER_S:.0f} s the speed makes "
+                          f"{by_speed_m:.0f} m, the positions {by_places_m:.0f} m. Such rows have no IRI. Check the "
+                          "receiver's settings (static navigation, simulator, the sentences it sends), or replace it")
             self._begin(timed)
             return
         longer_m = max(by_speed_m, by_places_m)

@@ -95,7 +95,7 @@ def test_a_file_behind_the_bare_option_is_no_rate() -> None:
 def test_the_end_of_a_range_is_reported(comfort) -> None:
     status, reported, complaints = comfort(EVEN_S, np.clip(at(EVEN_S, FINE), -5, 0.9))
     assert (status, len(complaints)) == (0, 1)
-    assert "samples of accel_z_mps2 stand at 0.9 m/s2, the end of a range" in complaints[0]
+    assert "samples of accel_z_mps2 are at 0.9 m/s2, the end of a range" in complaints[0]
     assert reported["doubts"][0]["at_mps2"] == 0.9
 
 
@@ -126,7 +126,7 @@ def test_bursts_are_refused_and_spread(comfort) -> None:
 
 def test_what_cannot_be_mended_is_refused_all_the_same(comfort) -> None:
     hole_s = np.where(EVEN_S < 20, EVEN_S, EVEN_S + 3)
-    assert "expected no hole above 0.5 s, found one of 3.01 s" in comfort(hole_s, at(EVEN_S, FINE), "--resample")[2][0]
+    assert "expected no gap above 0.5 s, found one of 3.01 s" in comfort(hole_s, at(EVEN_S, FINE), "--resample")[2][0]
     back_s = EVEN_S.copy()
     back_s[500] -= 1
     assert "ride.csv:502: expected no time before" in comfort(back_s, at(EVEN_S, FINE), "--resample")[2][0]
@@ -162,7 +162,7 @@ def test_a_sensor_that_stood_still_for_a_while_left_a_hole(comfort) -> None:
     still[1000:2000] = still[1000]
     status, _, complaints = comfort(EVEN_S, still)
     assert (status, len(complaints)) == (2, 1)
-    assert "ride.csv:1003: expected no hole above 0.5 s, found a sensor frozen" in complaints[0]
+    assert "ride.csv:1003: expected no gap above 0.5 s, found a sensor frozen" in complaints[0]
     short = samples.copy()
     short[1000:1030] = short[1000]
     status, reported, _ = comfort(EVEN_S, short)
@@ -247,7 +247,7 @@ def test_modes_refuses_sensors_that_stood_still_for_a_while(tmp_path: Path) -> N
     path = write_record(tmp_path / "tower.csv", EVEN_S, top=top, middle=middle)
     done = called("modes", path, "--method", "ssi")
     assert done.returncode == 2
-    assert "tower.csv:1003: expected no hole above 0.5 s, found a sensor frozen on all axes" in done.stderr
+    assert "tower.csv:1003: expected no gap above 0.5 s, found a sensor frozen on all axes" in done.stderr
 
 
 def test_a_record_that_begins_with_a_sensor_at_rest_is_doubted(tmp_path: Path) -> None:

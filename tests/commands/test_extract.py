@@ -173,7 +173,7 @@ def test_what_cannot_be_used_is_refused_in_one_line(place: Path, drive: DemoDriv
         ((dump, "--profile", tmp_path / "far.csv"), "the nearest fix is"),
         ((dump, "--profile", tmp_path / "bare.csv"), "two rows or more with lat_deg,lon_deg"),
         ((dump, "--profile", tmp_path / "typo.csv"), "no farther apart than their distances"),
-        ((changed(place, tmp_path / "a", lambda one: one.source != GPS),), "expected fixes with a speed and a place"),
+        ((changed(place, tmp_path / "a", lambda one: one.source != GPS),), "fixes with a speed and a position"),
         ((changed(place, tmp_path / "b", lambda one: one.source == GPS),), "expected readings of the accelerometer"),
         ((dump, dump), "dumps of different names"),
     ):
@@ -207,9 +207,9 @@ def test_dumps_without_speeds_or_with_three_readings_are_refused_in_one_line(pla
     silent = [Event(second * 1_000_000 + 999_999, GPS, without_speeds(b"".join(
         one.data for one in fixes if one.t_us // 1_000_000 == second))) for second in second_s]
     for name, kept, said in (
-        ("silent", [*readings, *(one for one in silent if one.data)], "expected fixes with a speed and a place"),
+        ("silent", [*readings, *(one for one in silent if one.data)], "expected fixes with a speed and a position"),
         ("three", [*fixes, *middle], "expected 5 s and 30 m of driving with fixes and readings"),
-        ("bare", middle, "expected fixes with a speed and a place"),
+        ("bare", middle, "expected fixes with a speed and a position"),
     ):
         writer = DumpWriter(tmp_path / f"{name}.dump", header)
         for event in sorted(kept, key=lambda one: one.t_us):

@@ -351,7 +351,7 @@ def test_what_cannot_be_used_is_refused_in_one_line(drive: DemoDrive, phone: Pho
     for words, said in (
         ((accel,), "expected a speed, or latitude and longitude, found neither"),
         ((accel, "--location", later), "by the clock of Accelerometer.csv"),
-        ((accel, "--location", kmh), "agrees with the places"),
+        ((accel, "--location", kmh), "agrees with the positions"),
         ((accel, "--location", speeds, "--profile", line), "latitude and longitude, which --profile needs"),
         ((tmp_path / "cell.csv", "--location", places), "cell.csv:41: expected a number for"),
         ((tmp_path / "back.csv", "--location", places), "the clock was set back"),

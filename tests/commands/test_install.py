@@ -174,7 +174,7 @@ def test_a_command_of_somebody_else_stays(root: Path, ran: list[tuple[str, ...]]
     else:
         (root / COMMAND).write_text("mine\n")
     before = everything(root)[COMMAND]
-    assert f"keep {root / COMMAND}: it is not ours" in take(installation(root, ran).install())
+    assert f"keep {root / COMMAND}: ridelog did not make it" in take(installation(root, ran).install())
     take(installation(root, ran).install())
     take(installation(root, ran).uninstall())
     assert everything(root)[COMMAND] == before

@@ -181,7 +181,7 @@ def test_a_unit_has_its_own_calibration():
     assert accel == pytest.approx((values - (4100, 4090, 4096)) / (330, 330, 324) * G_MPS2)
     with pytest.raises(SettingsError, match="no calibration"):
         PascoDecoder(load_profile("lines"), own)
-    with pytest.raises(SettingsError, match="a count or more"):
+    with pytest.raises(SettingsError, match="at least one count"):
         ScaleCalibration((1, 2, 3), (4, 5, 3))
 
 

@@ -188,7 +188,7 @@ def test_at_the_receivers_port_it_says_what_comes_and_what_to_do() -> None:
         return decoder.unread
 
     assert said(nmea("GSV", numMsg=1, msgNum=1, numSV=0)).startswith("it sends GSV (such as '$")
-    assert "ridelog takes places only from RMC, GGA and GLL: have it send RMC" in said(
+    assert "ridelog takes positions only from RMC, GGA and GLL: have it send RMC" in said(
         nmea("GNS", posMode="AA", numSV=9, lat=45.0, NS="N", lon=7.0, EW="E"))
     assert "switch the checksum on" in said(without_checksum)
     assert "$GPRMC,090000.00,A" in said(without_checksum)
@@ -220,7 +220,7 @@ def test_at_the_sensors_port_it_says_how_lines_differ(form: str, words: str) -> 
 def test_at_the_sensors_port_a_time_or_a_receiver_is_recognised() -> None:
     decoder = PascoDecoder(load_profile("lines"))
     decoder.feed(0, b"".join(b"%d,0.01,0.02,0.99\r\n" % (10 * k) for k in range(60)))
-    assert "4 numbers, the first of which grows as a time does, with commas between them" in decoder.unread
+    assert "4 numbers, the first of which grows like a time, with commas between them" in decoder.unread
     other = PascoDecoder(load_profile("lines"))
     other.feed(0, b"".join(nmea("GSV", numMsg=1, msgNum=1, numSV=0)() for _ in range(40)))
     assert "as a GPS receiver sends: the two ports may be swapped" in other.unread

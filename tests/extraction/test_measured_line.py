@@ -48,5 +48,5 @@ def test_standing_beside_the_line_is_no_pass() -> None:
 
 
 def test_a_line_needs_two_places() -> None:
-    with pytest.raises(ValueError, match="two places"):
+    with pytest.raises(ValueError, match="two positions"):
         MeasuredLine.of(np.zeros(1), np.zeros(1), np.zeros(1))

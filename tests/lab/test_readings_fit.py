@@ -46,7 +46,7 @@ def test_places_that_are_off_are_found_and_their_errors_are_counted() -> None:
     run = drive(3, 0.0, 0.1, PLACE_STD_M)
     exact = ridelog.identify("rav4-2009", drive(3, 0.0, 0.1, 0.0), list(TRUE))
     found = ridelog.identify("rav4-2009", replace(run, facts=RecordFacts(place_std_m=PLACE_STD_M)), list(TRUE))
-    assert 0.02 < found.as_json()["moved_m"] < 4 * PLACE_STD_M and "Places are uncertain" in found.text
+    assert 0.02 < found.as_json()["moved_m"] < 4 * PLACE_STD_M and "Positions are uncertain" in found.text
     assert found.error_after < 1.1 * exact.error_after
     for name, value in TRUE.items():
         assert abs(found.parameters[name] - value) < 3 * found.standard_errors[name]

@@ -39,7 +39,7 @@ def test_a_speed_that_is_not_that_of_the_places_gives_no_iri_and_is_said(tmp_pat
     status = car.drive(1)
     assert status.gps.state == "doubtful"
     reported, *_ = advice(status)
-    assert "speed and its places disagree" in reported
+    assert "speed and positions disagree" in reported
     assert "the car stands" not in screen(status, None)[0]
     known_s = 13 if factor < 1 else 0  # a speed that is too small shows after a hundred metres of difference
     rows = [row for row in car.rows.records if row.speed_mps and row.t_us > car.begin_us + known_s * 1e6]

@@ -130,7 +130,7 @@ def _picture(passes: list[ProfilerPass]) -> Curves:
 _DOWNLOAD = "clone github.com/peacefulotter/LiRA-Map (MIT); server/backup is read"
 STUDY = Study(
     "lira_map", "How well a reference profiler repeats itself, 10 m and 100 m", "server/backup/trip_iri_*",
-    "Three passes over some 26 km of Danish road, by their places. Their cells of 10 m begin at different places. "
+    "Three passes over some 26 km of Danish road, by their positions. Their cells of 10 m begin at different places. "
     "Nearest: each cell against the nearest one, up to 5 m off, which understates how alike they are. Aligned: means "
     "of parts of two cells, smoother than the measured ones, which overstates it. The truth lies between. Moved piece "
     "by piece they are even more alike, as each piece may follow the noise. This was run on the real files.",

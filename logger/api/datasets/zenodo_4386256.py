@@ -110,7 +110,7 @@ def _laser_road(name: str, elevation: Path, half: int, places: Path) -> LaserRoa
     north_m, east_m = (EARTH_RADIUS_M * np.radians(np.diff(one)) for one in (lat_deg, lon_deg))
     way_m = np.concatenate([[0.0], np.cumsum(np.hypot(north_m, east_m * np.cos(np.radians(lat_deg[0]))))])
     if not way_m[-1] > 0:
-        raise BadInput(f"{places}: expected places along a road, found one place")
+        raise BadInput(f"{places}: expected positions along a road, found one")
     along_m = way_m * (at_m[-1] / way_m[-1])  # both are the whole road
     return LaserRoad(name, spacing_m, elevation_m, *(np.interp(at_m, along_m, one) for one in (lat_deg, lon_deg)))
 
@@ -145,7 +145,7 @@ _DOWNLOAD = "download doi 10.5281/zenodo.4386256 (CC0) and unpack it into one fo
 STUDY = Study(
     "zenodo_4386256", "Phones at 100 Hz against laser profiles, 10 m and 100 m", "Three roads",
     "Each trip is processed as any recording: extract --csv --profile aligns it with the laser profile, by the "
-    "phone's places and then by the road that the car felt. Then estimate compares its windows with the profile's "
+    "phone's positions and then by the road that the car felt. Then estimate compares its windows with the profile's "
     "exact IRI. The cars' parameters are not published: the model of a sedan replaces them, unless --vehicle names "
     "another. The reader is tested on small files of the same layout.",
     road_sets.from_folder("Zenodo 4386256", _DOWNLOAD, run),

@@ -477,7 +477,7 @@ def _road_options(question: IdentifyQuestion) -> tuple[RoadOptions, IdentifyQues
 def _head(given: vehicle_file.CarModel, free: int, records: Sequence[Record], more: str, stop: str = ";") -> str:
     vehicle, runs = given.vehicle, "1 run" if len(records) == 1 else f"{len(records)} runs"
     begun = (f"the first {records[0].skip_s:g} s of a run left out" if records[0].skip_s else
-             "nothing drives it: identify estimates the initial state as well")
+             "no excitation: identify estimates the initial state as well")
     return (f"{vehicle.name} ({vehicle.model.replace('_', ' ')}): {free} free, {runs}, "
             f"{sum(len(one.kept_mps2) for one in records)} samples at {records[0].rate_hz:.5g} Hz{more}{stop} {begun}")
 
@@ -602,8 +602,8 @@ def record_words(found: ReadingsFit) -> Iterator[str]:
     if found.rounded:
         yield "Readings are rounded: each is known to within one step (step_mps2 in run.yaml)."
     if found.moved_m:
-        yield (f"Places are uncertain (place_std_m in run.yaml): they were corrected by up to {found.moved_m:.2g} m, "
-               "and the standard errors include that uncertainty.")
+        yield (f"Positions are uncertain (place_std_m in run.yaml): they were corrected by up to {found.moved_m:.2g} m"
+               ", and the standard errors include that uncertainty.")
 
 
 def record_json(found: ReadingsFit, common: CommonRoughness, records: Sequence[Record]) -> dict[str, Any]:

@@ -117,7 +117,7 @@ class IdentifyQuestion(question.LongQuestion):
         "measured: with its profile; unmeasured: each run over a road of its own, of this waviness; same: all over "
         "one", choices=(MEASURED, UNMEASURED, SAME), by_value={
             UNMEASURED: ("unmeasured-road", "the roads were not measured; each run has one of its own"),
-            SAME: ("same-road", "the road was not measured; all runs are over the same one; their places may be off "
+            SAME: ("same-road", "the road was not measured; all runs are over the same one; their positions may be off "
                                 "by 10 m, their distances by 1 per cent")})] = MEASURED
     waviness: Annotated[float | None, question.InPython(
         "of a road that was not measured (default: 2); to find it, add road.waviness to `free`",

@@ -252,11 +252,11 @@ def conclusion(found: LabComparison) -> str:
                 "wrong, or these parameters imitate a missing effect.")
     if found.missing:
         return ("The model lacks something: after a refit, the residual (measured - model) still depends on "
-                + ("what drives the rig and on its motion." if on_rig else "the road and the car's motion."))
+                + ("the excitation and on the rig's motion." if on_rig else "the road and the car's motion."))
     if found.tests_found and not all(test.test.of_placement for test in found.tests_found):
         if on_rig:
-            return ("The model lacks no effect of the rig. The residual (measured - model) does not depend on what "
-                    "drives it; it looks like coloured noise of the sensor.")
+            return ("The model lacks no effect of the rig. The residual (measured - model) does not depend on the "
+                    "excitation; it looks like coloured noise of the sensor.")
         return ("The model lacks no effect of the car. The residual (measured - model) does not depend on the road; it "
                 "looks like coloured noise of the sensor or the engine.")
     removed = found.removed.drifting_sensors or found.removed.distance_error_m > 0
@@ -277,7 +277,7 @@ def next_step(found: LabComparison) -> str:
     if not found.missing:
         on_rig = are_on_rig(found.refitted.residuals.runs)
         harder = "Stronger motion or other frequencies" if on_rig else "Rougher roads or other speeds"
-        return f"Next: nothing. {harder} would test the model harder."
+        return f"Next: nothing. {harder} would be a stronger test."
     if any(test.road for test in found.tests_found):
         return "Next: ridelog diagnose with the same arguments finds the physical effect that explains the residual."
     return (f"Next: ridelog diagnose with the same arguments. If it finds nothing, ridelog identify --free "
@@ -470,7 +470,7 @@ def _alignment(found: LabComparison) -> Detail:
 def _by_part(found: LabComparison) -> Iterator[Block]:
     plain, refitted = found.plain.where, found.refitted.where
     yield _table("By band", "Hz", plain.frequency, refitted.frequency)
-    yield Hint("Share: of the residual's power. Filed: with the vehicle's file unchanged.")
+    yield Hint("Share: of the residual's power. Filed: with the vehicle file unchanged.")
     yield _table("By speed", "m/s", plain.speed, refitted.speed)
     yield _table("By amplitude of the motion", found.plain.residuals.unit, plain.amplitude, refitted.amplitude)
 
@@ -565,8 +565,8 @@ def judgement(found: AddedEffects) -> list[str]:
                            "{} refitted without it, {} with it, noise floor about {}")
     if found.excess > UNEXPLAINED:
         lines.append(f"Something more is missing: in the worst run the residual is {1 + found.excess:.3g} times the "
-                     "sensor's noise. The numbers are biased by that, maybe by more than their standard errors; add "
-                     "what ridelog diagnose finds together.")
+                     "sensor's noise. This biases the parameters, maybe by more than their standard errors; add "
+                     "all that ridelog diagnose finds together.")
     for one in found.new:
         at = [parameter.name for parameter in one.effect.parameters if parameter.is_free
               and one.values[parameter.name] != parameter.default and parameter.at_bound(one.values[parameter.name])]

@@ -151,7 +151,7 @@ def hold_doubts(t_s: Array, held: Bools, file: str) -> list[Doubt]:
                        f"before ({(~held).sum() / (t_s[-1] - t_s[0]):.3g} Hz written at {_rate_hz(t_s):.4g}): record "
                        "at a higher rate")
     if lasted_s[row] > LONGEST_HOLE_S:
-        raise BadInput(f"{place(file, int(first[row]))}: expected no hole above {LONGEST_HOLE_S:g} s, found a sensor "
+        raise BadInput(f"{place(file, int(first[row]))}: expected no gap above {LONGEST_HOLE_S:g} s, found a sensor "
                        f"frozen on all axes from {begin_s[row]:.6g} to {end_s[row]:.6g} s: cut the record "
                        "there")
     total_s = float(lasted_s.sum())
@@ -168,7 +168,7 @@ def with_marks(record: EvenRecord, usable: Array | None) -> EvenRecord:
     doubts = [Doubt("holes", f"{share:.1%} of the samples are no readings, as the column usable says, and lie on "
                     "straight lines: the true values are higher", {"share": share})]
     doubts = doubts if share > _HOLES else []
-    doubts += [Doubt("range_end", f"{clipped} samples stand at an end of the sensor's range, as the column usable "
+    doubts += [Doubt("range_end", f"{clipped} samples are at an end of the sensor's range, as the column usable "
                      "says: the true values are higher; record with a larger range", {"samples": clipped})
                ] if clipped else []
     return replace(record, doubts=(*record.doubts, *doubts))
@@ -206,7 +206,7 @@ def _resampled(t_s: Array, samples: Array, names: Mapping[str, Array], others: M
     widest_s = float(steps.max()) if len(steps) else 0.0
     if widest_s > LONGEST_HOLE_S:
         row = int(np.searchsorted(times_s, taken_s[int(np.argmax(steps)) + 1]))
-        raise BadInput(f"{place(file, row)}: expected no hole above {LONGEST_HOLE_S:g} s, found one of "
+        raise BadInput(f"{place(file, row)}: expected no gap above {LONGEST_HOLE_S:g} s, found one of "
                        f"{widest_s:.4g} s: cut the record there")
     if len(steps) < 2:
         raise BadInput(f"{file}: expected three samples or more, found {len(taken_s)}")
@@ -296,7 +296,7 @@ def still_doubts(names: Iterable[str], t_s: Array, samples: Array, held: Bools) 
 
 def end_doubts(name: str, values: Array) -> list[Doubt]:
     """Where samples (n,) of an axis stand at an end of the sensor's range."""
-    return [Doubt("range_end", f"{one.samples} samples of {name} stand at {one.at:.4g} m/s2, the end of a range: the "
+    return [Doubt("range_end", f"{one.samples} samples of {name} are at {one.at:.4g} m/s2, the end of a range: the "
                   "ride is harder than the values say; record with a larger range",
                   {"at_mps2": one.at, "samples": one.samples}) for one in repeated_samples.range_ends(values)]
 

@@ -195,8 +195,8 @@ def _t6_3(effort: Workload) -> Result:
         Column("step assumed a third too high, the source's way: error of mass [%]", ".1f"),
         Column("ours, height estimated: error of mass [%]", ".1f"), Column("its standard error [%]", ".1f"),
         Column("mass known: error of height [mm]", ".1f"), Column("its standard error [mm]", ".1f")), rows)
-    verdict = ("The source assumed a flat road. A flat input moves no car, whatever its mass: ours refuses to answer, "
-               "and the printed masses, 12 to 60 % off, reflect the noise model and the road, not the car. A step "
+    verdict = ("The source assumed a flat road. A flat input moves no car, whatever its mass: ridelog refuses to answer"
+               ", and the printed masses, 12 to 60 % off, reflect the noise model and the road, not the car. A step "
                "assumed a third too high makes the mass about 15 % wrong on a smooth road (Fig 4.31). With the height "
                "estimated together with the mass, a step of 38.1 mm gives both; the error grows with the road's "
                "roughness, and the standard error says how much. A step of half an inch on a rough road hardly shows "
@@ -280,10 +280,10 @@ def _rms_t6_3(values: Sequence[tuple[float, ...]]) -> list[float]:
 
 T6_3 = Study("table_6_3", "Mass from a bridge's steps", "Table 6.3 (and 6.4), section 6.2.2", "The source measured, "
              "and its records were never published. Simulated: the car of Table 4.2, a PS-2119 with steps of 0.01 g, "
-             "steps of 38.1 and 12.7 mm on roads of IRI 0, 2 and 5 m/km; the place of a step is also "
+             "steps of 38.1 and 12.7 mm on roads of IRI 0, 2 and 5 m/km; the position of a step is also "
              "estimated.", _t6_3,
              items=alike(("Table 6.3", "Table 6.4"), Word.NOT_REPRODUCIBLE, "The records were never published; a flat "
-                         "input shows nothing of the mass, and ours refuses it."))
+                         "input shows nothing of the mass, and ridelog refuses it."))
 
 
 _UNIT_M = 0.01

@@ -34,7 +34,7 @@ class Skyhook(Family):
         own = context.vehicle.front.suspension_damping_n_s_per_m
         tried, most = tuple(rounded(share * own) for share in _TRIED), rounded(_MOST * own)
         sky = Parameter("sky_n_s_per_m", tried[0], 0.0, most, 0.0, Scale.LINEAR, tried,
-                        "force over the velocity of the body's end of the suspension")
+                        "force per velocity of the body's end of the suspension")
         firmest = Parameter("firmest_n_s_per_m", tried[1], rounded(0.01 * own), most, None, Scale.LOG, tried,
                             "largest force over the suspension's rate")
         return [self.draft(parameters, handed_on("hooked"), functions, title=f"{variant} {self.title}", variant=variant)
