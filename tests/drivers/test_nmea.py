@@ -603,7 +603,7 @@ def test_a_receiver_that_names_no_date_is_told_what_to_send():
     assert decoder.doubt == ""
 
 
-@pytest.mark.parametrize(("every_s", "doubt"), [(1, ""), (5, ""), (10, "it sends only each 10 s")])
+@pytest.mark.parametrize(("every_s", "doubt"), [(1, ""), (5, ""), (10, "it sends only every 10 s")])
 def test_a_receiver_that_sends_too_seldom_is_named(every_s, doubt):
     decoder = NmeaDecoder()
     for k in range(5):
