@@ -23,6 +23,7 @@ from logger.arrays import Array
 from logger.lab.likelihood.by_squares import BySquares
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit, fit_model
+from logger.lab.likelihood.noise_floor import floor_error, sensor_noise_of
 from logger.lab.likelihood.posterior import NotSimulated, Posterior, State
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.whittle import LOWEST_HZ, UNEXPLAINED
@@ -114,10 +115,12 @@ class UnknownNumbers(MeasuredRoad):
 
     @staticmethod
     def _shows_the_car(by_squares: BySquares, without: State, there: State) -> bool:
-        """Whether a model leaves so little of what was measured that the numbers of its car are not far off, and so
-        little of what the one without its last effect leaves that others can only imitate it."""
-        left, before = (by_squares.posterior.error(one) for one in (there, without))
-        return left < UNEXPLAINED and left**2 < IMITATION * before**2
+        """Whether a model leaves so little above the noise of what was measured that the numbers of its car are not far
+        off, and so little of what the one without its last effect leaves that others can only imitate it."""
+        posterior = by_squares.posterior
+        noise = floor_error(posterior, sensor_noise_of(posterior, there))**2
+        left, before = (posterior.error(one)**2 - noise for one in (there, without))
+        return left < min(UNEXPLAINED**2, IMITATION * before)
 
     def stripped(self, now: Baseline, name: str) -> None:  # type: ignore[override]
         """It is the fitted one."""

@@ -8,6 +8,7 @@ import pytest
 import ridelog
 from logger.lab.likelihood.by_squares import BySquares
 from logger.lab.likelihood.priors import Tolerance
+from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.selection.starts import UnknownNumbers
 
 from ...support.drives.bench_rig import Rig, shaken, swept_table, write_run
@@ -62,17 +63,19 @@ def test_a_start_ends_early_where_it_cannot_reach_another_at_its_pace() -> None:
 
 
 @pytest.mark.slow
-def test_where_an_effect_leaves_next_to_nothing_others_are_tried_in_its_car(
-        tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("noise_mps2", [0.02, 0.5])
+def test_where_an_effect_leaves_next_to_nothing_but_noise_others_are_tried_in_its_car(
+        noise_mps2: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     rig, ranked, rank = Rig(wheel_kg=1.0, damper=7.5, tire=6000.0, cubic=4e6), list[str](), BySquares.rank
     monkeypatch.setattr(BySquares, "rank", lambda *given: ranked.append(
         given[1][-1].effect.name if given[1] else "") or rank(*given))
-    write_run(tmp_path / "run", shaken(rig, swept_table(12.0, 1.0, 15.0, 0.006)), 0.02, 3)
+    write_run(tmp_path / "run", shaken(rig, swept_table(12.0, 1.0, 15.0, 0.006)), noise_mps2, 3)
     vehicle = tmp_path / "rig.yaml"
     vehicle.write_text(FILE.format(*(f"{one} +- 100%" for one in (
         rig.wheel_kg, rig.spring, rig.damper, rig.tire))), "utf-8")
     found = ridelog.diagnose(vehicle, tmp_path / "run", candidates=CANDIDATES)
     assert found.verdict == ("progressive_spring",)
+    assert (found.noise_floor_error > UNEXPLAINED) == (noise_mps2 > 0.1)
     draws = UnknownNumbers().draws
     assert ranked.count("progressive_spring") >= draws
     assert sum(ranked.count(name) for name in CANDIDATES[1:]) < draws
