@@ -135,10 +135,11 @@ def test_a_memory_of_which_its_record_shows_nothing_stays_at_rest() -> None:
 
 @pytest.mark.parametrize("measures", SIGNALS)
 def test_a_driven_record_begins_in_the_ringing_of_before(measures: str) -> None:
-    """Cut from a longer one of a mass that rings for 5 s: both are the same motion; of one that does not ring, too."""
+    """Cut from a longer one of a mass that rings for 5 s: both are the same motion; of one that does not ring, too,
+    and of one that creeps back, damped far beyond critical."""
     shaken = Excitation(RATE_HZ, 0.002 * np.random.default_rng(3).standard_normal(1200))
     whole = Run("whole", RATE_HZ, *np.zeros((3, 1200)), shaken, facts=RecordFacts(main=SIGNALS[measures]))
-    for damping in (0.3, 10 * C):
+    for damping in (0.3, 10 * C, 6.0 * K):
         ringing = Vehicle("ringing", "single_mass", M, None, Axle(0.0, 0.0, K, damping, 0.0), None, 0.0)
         (motion,) = SimulatedRuns([whole]).predict(compose(ringing))
         later = replace(whole.part(slice(400, None)), track=shaken.begun(4.0))
