@@ -121,7 +121,7 @@ def force_n(p, at):
 
     def _free(self, variant: str, knots: Sequence[float], size_n: float) -> Draft:
         """A force that follows a smooth curve through points on either side of rest."""
-        places = sorted({sign * rounded(one) for one in knots for sign in (-1, 1)})
+        places = sorted({sign * rounded(one) for one in knots if one for sign in (-1, 1)})  # beside rest, which is one
         names = {one: f"force_{number}_n" for number, one in enumerate(places, 1)}
         at = sorted([*places, 0.0])
         functions = f"""
