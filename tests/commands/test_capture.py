@@ -67,7 +67,7 @@ def test_a_port_that_goes_keeps_what_came(monkeypatch: pytest.MonkeyPatch, tmp_p
 def test_silence_says_what_to_check(monkeypatch: pytest.MonkeyPatch, tmp_path: Path,
                                     capsys: pytest.CaptureFixture[str]) -> None:
     assert run(monkeypatch, Port([], gone=False), tmp_path / "a.dump", "--seconds", "1") == 1
-    assert "Nothing came" in capsys.readouterr().out
+    assert "Nothing arrived" in capsys.readouterr().out
 
 
 def test_a_recording_is_never_overwritten(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -98,7 +98,7 @@ def test_frames_of_fixed_length_show() -> None:
     assert [distance for distance, _ in capture.repeat_distances(frames)] == [9, 18, 27]
     text = "\n".join(capture.first_look(frames))
     assert "binary" in text
-    assert "after: 9 (" in text
+    assert "every: 9 (" in text
 
 
 @pytest.mark.parametrize("data", [b"\x07", bytes(500), bytes(range(256)) * 3])

@@ -198,7 +198,7 @@ def test_the_demos_drives(tmp_path: Path, capsys: pytest.CaptureFixture[str]) ->
     assert main(["demo", "--lab", "--unpack", "--out", str(tmp_path), "--json"]) == 0
     reported = json.loads(capsys.readouterr().out)
     assert reported["runs"] == [str(tmp_path / "slow"), str(tmp_path / "brisk")]
-    with pytest.raises(BadInput, match="expected --lab, --field or --car"):
+    with pytest.raises(BadInput, match="expected --lab, --field, --car or --years"):
         main(["demo", "--unpack"])
     (tmp_path / "file").touch()
     with pytest.raises(BadInput, match="expected a folder"):

@@ -79,7 +79,7 @@ def test_a_sample_that_was_renewed_while_it_was_read_is_never_taken(
             try:
                 got.append(tuple(chip.read_raw()))
             except BadReply as error:
-                assert "renewed" in str(error)
+                assert "changed" in str(error)
         assert set(got) <= set(taken)
         assert bus.blocks == 0
         assert bus.data_reads <= 20 * 12

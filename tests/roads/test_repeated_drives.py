@@ -252,6 +252,6 @@ def test_kilometre_posts_hold_between_them() -> None:
     found = measures(corner.lat_deg, corner.lon_deg, None, None, np.column_stack([posts.lat_deg, posts.lon_deg]),
                      np.array([2000.0, 1490.0]))
     np.testing.assert_allclose(found, [1290.0, 2300.0], atol=0.05)
-    with pytest.raises(ValueError, match="growing numbers"):
+    with pytest.raises(ValueError, match="increasing numbers"):
         measures(corner.lat_deg, corner.lon_deg, None, None, np.column_stack([posts.lat_deg, posts.lon_deg]),
                  np.array([1490.0, 2000.0]))

@@ -220,8 +220,7 @@ def optimise_numbers(linear: LinearModel, state: State, free_parameters: Sequenc
     own: list[Array] | None = None
     p = linear.count
     known: tuple[Array, _Point, list[Array]] | None = None
-    evaluated = list[_Point]()
-    here = without_common_scale(linear, (), None)[0] if linear.prior.is_vague and not state.effects else linear
+    here, evaluated = linear, list[_Point]()
     realigns = any(state.effects[free.effect].effect.realigns for free in free_parameters)
     predict = linear.posterior.predictor(state)
 
@@ -333,11 +332,9 @@ def without_common_scale(linear: LinearModel, effects: Sequence[Chosen], own: li
         parameter = one.effect.parameters[free.parameter]
         value = one.values[parameter.name]
         step.append(value * slope_of(parameter, value) if grows_with_mass(parameter.name) and value else 0.0)
-    slopes = numbers if own is None else list(map(np.vstack, zip(numbers, own, strict=True)))
     scaling = np.array(step)
-    # A difference is wrong by the more, the larger it is: that of a damping is far less than those of mass and spring.
-    share = scaling * sum((one**2).sum(axis=1) for one in slopes)
-    share /= (share @ scaling) or 1.0
+    share = np.divide(1.0, scaling, out=np.zeros_like(scaling), where=scaling != 0) / np.count_nonzero(scaling)
+    slopes = numbers if own is None else list(map(np.vstack, zip(numbers, own, strict=True)))
     freed = [one - share[:, None] * (scaling @ one) for one in slopes]
     p = linear.count
     return linear.with_number_slopes([one[:p] for one in freed]), None if own is None else [one[p:] for one in freed]
