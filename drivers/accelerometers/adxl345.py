@@ -63,6 +63,7 @@ RATE_CODES = {200: 0x0B, 400: 0x0C, 800: 0x0D}  # [Hz]; at 100 what is above 50 
 FIFO_ENTRIES = 32
 ENTRY_BYTES = 6
 COUNTS_PER_G = 256
+LARGEST_COUNT = 16 * COUNTS_PER_G - 1  # +-16 g in 13 bits
 NOISE_MPS2 = 1.1 / COUNTS_PER_G * STANDARD_GRAVITY_MPS2  # Z at 100 Hz, 1.1 LSB r.m.s.; on the 100 Hz grid at any rate
 TURN_ON_S = 0.0011  # and one sample (Table 1)
 
@@ -140,7 +141,7 @@ class Adxl345Decoder(BufferedDecoder):
             raise BadReply(f"an ADXL345 answer of {len(data)} bytes: expected INT_SOURCE, FIFO_STATUS and its entries")
         counts = np.frombuffer(data, dtype="<i2", offset=2).reshape(-1, 3).astype(np.float64)
         return Entries(bool(OVERRUN.extract(data[0])), counts * (STANDARD_GRAVITY_MPS2 / COUNTS_PER_G),
-                       np.asarray(((counts <= -16 * COUNTS_PER_G) | (counts >= 16 * COUNTS_PER_G - 1)).any(axis=1)))
+                       np.asarray(((counts <= -LARGEST_COUNT - 1) | (counts >= LARGEST_COUNT)).any(axis=1)))
 
 
 class _Adxl345(Accelerometer[Adxl345Config]):

@@ -241,6 +241,7 @@ ROWS_A_SIDECAR = 500  # Rows after which the sidecar of an open part is written 
 WAITING_ROWS = 5000
 """Most rows kept in memory, some 5 MB: 38 km of windows of 7.62 m. Of more the oldest are lost, and counted."""
 
+FIRST_WAIT_US = US_PER_S
 LONGEST_WAIT_US = 30 * US_PER_S
 log = logging.getLogger(__name__)
 
@@ -267,7 +268,7 @@ class BufferedLog:
         self._on_disk = 0
         self._held = ""
         self._retry_us = 0
-        self._wait_us = US_PER_S
+        self._wait_us = FIRST_WAIT_US
         self.trouble = "not open yet"
         self.since_us = now_us()
         self.rows_lost = 0
@@ -361,7 +362,7 @@ class BufferedLog:
         else:
             log.info("logging to %s", self._log.path)
             self.trouble = ""
-            self._wait_us = US_PER_S
+            self._wait_us = FIRST_WAIT_US
         self._let_go_of_what_is_safe()
 
     def _catch_up(self, segment_log: SegmentLog) -> None:

@@ -38,6 +38,7 @@ _COMFORT = re.compile("[a-z_]{0,40}")
 _CLASS = re.compile("[A-H]?")
 FLAGS = re.compile("[a-z_]{1,40}(?:[|][a-z_]{1,40})*")
 """Words of a row are names of our own; one of a newer logger may be another, and is none that could do harm."""
+_SHOWN = 40  # characters of what is wrong in a row
 _ROW_END = re.compile(rb",[0-9a-f]{8}")
 
 
@@ -69,7 +70,7 @@ def _read_utc(text: str) -> int | None:
     if not text:
         return None
     if not _UTC.fullmatch(text):
-        raise BadRow(f"expected UTC such as 2026-07-04T10:15:00.250Z, found {shortened(text, 40)}")
+        raise BadRow(f"expected UTC such as 2026-07-04T10:15:00.250Z, found {shortened(text, _SHOWN)}")
     utc_us = (datetime.fromisoformat(text) - EPOCH) // timedelta.resolution
     if not 0 <= utc_us < LATEST_US:
         raise BadRow(f"expected UTC from 1970 to 2199, found {text!a}")
@@ -84,14 +85,14 @@ def _write_seconds(t_us: int) -> str:
 def _read_seconds(text: str) -> int:
     match = _SECONDS.fullmatch(text)
     if not match:
-        raise BadRow(f"expected seconds with six decimals, found {shortened(text, 40)}")
+        raise BadRow(f"expected seconds with six decimals, found {shortened(text, _SHOWN)}")
     t_us = int(match[2]) * US_PER_S + int(match[3])
     return -t_us if match[1] else t_us
 
 
 def _read_count(text: str) -> int:
     if not _COUNT.fullmatch(text):
-        raise BadRow(f"expected a whole number, found {shortened(text, 40)}")
+        raise BadRow(f"expected a whole number, found {shortened(text, _SHOWN)}")
     return int(text)
 
 
@@ -99,9 +100,9 @@ def _read_decimal(text: str, pattern: str, largest: float) -> float:
     """A number as the pattern writes it, and in no other way."""
     value = float(text)
     if not isfinite(value) or pattern % value != text:
-        raise BadRow(f"expected a finite number such as {pattern % 1.5}, found {shortened(text, 40)}")
+        raise BadRow(f"expected a finite number such as {pattern % 1.5}, found {shortened(text, _SHOWN)}")
     if abs(value) > largest:
-        raise BadRow(f"expected a number up to {largest:g}, found {shortened(text, 40)}")
+        raise BadRow(f"expected a number up to {largest:g}, found {shortened(text, _SHOWN)}")
     return value
 
 
@@ -140,7 +141,7 @@ def _word(name: str, known: re.Pattern[str], meaning: str) -> LogColumn:
 
 def _read_word(text: str, known: re.Pattern[str]) -> str:
     if not known.fullmatch(text):
-        raise BadRow(f"expected a word that a logger writes, found {shortened(text, 40)}")
+        raise BadRow(f"expected a word that a logger writes, found {shortened(text, _SHOWN)}")
     return text
 
 
@@ -224,7 +225,7 @@ def parse_row(text: str) -> WindowRecord:
         return WindowRecord(**{column.attribute: column.read(field)
                                for column, field in zip(COLUMNS, fields, strict=False)})
     except ValueError as error:  # a number or a date that is none
-        raise BadRow(str(error)[:80]) from None
+        raise BadRow(str(error)[:2 * _SHOWN]) from None
 
 
 def as_now(text: str, record: WindowRecord) -> str:

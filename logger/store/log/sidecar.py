@@ -171,7 +171,6 @@ def _add(holes: list[Hole], hole: Hole) -> None:
         holes[-1] = Hole(holes[-1].first, hole.last)
 
 
-
 UNCHECKED = "taken_over_unchecked"  # In a sidecar that a repair has made of one without a checksum
 SETTINGS_LOST = "settings_lost"  # In a sidecar that a repair has made where there was none that could be read
 _SEAL = frozenset({"format", "sha256"})
