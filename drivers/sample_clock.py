@@ -639,11 +639,11 @@ class DatedSamples:
         slow_hz, fast_hz = self.clock.rates_hz
         if fast_hz - slow_hz > DRIFT * fast_hz:
             return (f"its clock drifts: {slow_hz:.1f} to {fast_hz:.1f} samples a second so far. ridelog dates its "
-                    "samples by their arrival: you need do nothing")
+                    "samples by their arrival: nothing needs to be done")
         if abs(slow_hz / self._rate_hz - 1) > self._tolerance:
             return (f"it gives {slow_hz:.1f} samples a second where {self._rate_hz:g} are expected, and ridelog "
                     "uses that rate. If the sensor's own rate is another one, samples are lost on the way")
         if BURSTS_S <= self.burst_s < LONGEST_BURSTS_S:
             return (f"its samples come {self.burst_s:.1g} s at a time, because something on the way buffers them. "
-                    "ridelog timestamps them at their steady rate: you need do nothing")
+                    "ridelog timestamps them at their steady rate: nothing needs to be done")
         return ""

@@ -76,7 +76,6 @@ from logger.store.formats.logger_csv import (
 )
 from logger.store.formats.record_checks import still_doubts
 from logger.store.formats.vehicle_file import read_model
-from logger.units import STANDARD_GRAVITY_MPS2
 
 _FLAT_TO_HZ = 38.0  # a run is (docs/at-the-desk.md)
 _CUT_S = 1.0  # to either side of a turn in the mount
@@ -91,8 +90,6 @@ class CsvSettings:
     columns      by role; None: known layouts are recognised
     location     the file with speed and place, where it is another one
     up           the axis that points up, "z" or "-z", where gravity is not in the record
-    sign         -1: what comes out is turned upside down
-    range_g      of the sensor [g]; None: not known
     speed_mps    all the way, where none was recorded [m/s]
     vehicle      name or file, instead of the one of the settings
     """
@@ -100,8 +97,6 @@ class CsvSettings:
     columns: Named | None = None
     location: Path | None = None
     up: str | None = None
-    sign: float = 1.0
-    range_g: float | None = None
     speed_mps: float | None = None
     vehicle: str | None = None
 
@@ -140,10 +135,9 @@ def recorded_csv(source: Path, asked: CsvSettings, config: Config, tell: Tell) -
               + f"{one.known.name} ({_listed(one)})" for one in tables.all()]
     time_s, samples, has_gravity = _accelerations(tables, asked, notes)
     origin_s = float(time_s[0]) if abs(time_s[-1]) > _LATEST_S else 0.0
-    tell("laying it on an even grid")
-    range_end = None if asked.range_g is None else asked.range_g * STANDARD_GRAVITY_MPS2
+    tell("resampling it")
     try:
-        even = even_samples(time_s - origin_s, samples, RATE_HZ, range_end)
+        even = even_samples(time_s - origin_s, samples, RATE_HZ)
     except ValueError as error:
         raise BadInput(f"{tables.acceleration.header.path}: {error}") from None
     roles, held = AXES if samples.shape[1] > 1 else ("up",), find_holds(time_s, samples)
@@ -157,8 +151,7 @@ def recorded_csv(source: Path, asked: CsvSettings, config: Config, tell: Tell) -
     fixes = replace(raw, time_s=raw.time_s - receiver.delay_s)
     readings = _levelled(even, asked, has_gravity, notes)
     seen_hz = SEEN * even.own_hz
-    facts = RecordFacts(step_mps2=_step_mps2(samples), range_mps2=range_end,
-                        taken_hz=None if even.as_read else even.own_hz,
+    facts = RecordFacts(step_mps2=_step_mps2(samples), taken_hz=None if even.as_read else even.own_hz,
                         pass_band_hz=(0.0, seen_hz) if seen_hz < _FLAT_TO_HZ else None)
     return Recorded(readings, fixes, config, model, facts, receiver, tables.acceleration.is_torn, tuple(notes),
                     left_out=_left_out(even, len(time_s), still_s))
@@ -382,14 +375,14 @@ def _repairs(even: EvenSamples) -> list[str]:
         notes[-1:] = [f"the sensor was frozen on all axes for {sum(even.holds_s):.3g} s in {places}, the longest "
                       f"{max(even.holds_s):.3g} s; those samples are left out"]
     if not even.as_read:
-        notes.append(f"{even.own_hz:.4g} samples a second, laid on an even grid of {RATE_HZ:g} Hz")
+        notes.append(f"{even.own_hz:.4g} samples a second, resampled to an even {RATE_HZ:g} Hz")
     if SEEN * even.own_hz < _FLAT_TO_HZ:
         notes.append(f"shows nothing above {SEEN * even.own_hz:.0f} Hz: the lab may name sensor_bandwidth for that")
     if even.clipped.any():
         notes.append(f"{np.count_nonzero(even.clipped)} samples at an end of the sensor's range, marked in the column "
                      "usable")
     if not even.present.all():
-        notes.append(f"{np.count_nonzero(~even.present) / RATE_HZ:.2g} s in holes between samples, marked in the "
+        notes.append(f"{np.count_nonzero(~even.present) / RATE_HZ:.2g} s in gaps between samples, marked in the "
                      "column usable")
     return notes
 
@@ -411,7 +404,7 @@ def _levelled(even: EvenSamples, asked: CsvSettings, has_gravity: bool, notes: l
     if not has_gravity:
         column = 0 if asked.up is None or even.samples.shape[1] == 1 else "xyz".index(asked.up[-1])
         accel = even.samples[:, column] * (-1.0 if (asked.up or "").startswith("-") else 1.0)
-        return GridReadings(time_s, asked.sign * accel, present, even.clipped)
+        return GridReadings(time_s, accel, present, even.clipped)
     heard = np.flatnonzero(present)
     turned = turns(time_s[heard], even.samples[heard]) if even.samples.shape[1] == 3 else []
     for at_s, words in turned:
@@ -429,7 +422,7 @@ def _levelled(even: EvenSamples, asked: CsvSettings, has_gravity: bool, notes: l
         tilts.append(f"{degrees(tilt_rad):.0f}")
     if even.samples.shape[1] == 3:
         notes.append(f"levelled by gravity, which is {' and '.join(tilts)} degrees off the nearest axis")
-    return GridReadings(time_s, asked.sign * accel, present, even.clipped)
+    return GridReadings(time_s, accel, present, even.clipped)
 
 
 def _step_mps2(samples: Array) -> float | None:

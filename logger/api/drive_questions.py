@@ -136,7 +136,7 @@ class EstimateQuestion(LongQuestion):
         "error (default: what the run's run.yaml says, or auto)", metavar="auto|MPS2",
         read=word_or_number(AUTO, NOISE), check=check_word_or_number(AUTO, NOISE))] = None
     step_mps2: Annotated[float | None, Option(
-        "step that readings are rounded to [m/s2], 0: none (default: what the run's run.yaml says)", ADDED,
+        "quantisation step of the readings [m/s2], 0: none (default: what the run's run.yaml says)", ADDED,
         "MPS2")] = None
     window_m: Annotated[float, Option("length of a window [m] (default: 7.62, 25 ft)", WINDOW, "M")] = WINDOW_M
     unit: Unit = None
@@ -166,8 +166,8 @@ class EstimateQuestion(LongQuestion):
 class CalibrateQuestion(LongQuestion):
     """Compute how much a vehicle shakes on known roads: IRI and Gd(n0) per r.m.s. acceleration, comfort per IRI.
 
-    The vehicle's model drives over random roads of IRI 1 to 10 m/km at 10 to 70 mph; one line per speed comes out, with
-    the scatter of single roads. The result is cached beside the vehicle's file (NAME.calibration.json) or in the user's
+    The vehicle's model drives over random roads of IRI 1 to 10 m/km at 10 to 70 mph; it prints one line per speed, with
+    the scatter between roads. The result is cached beside the vehicle's file (NAME.calibration.json) or in the user's
     cache, unless the file has an effect of your own.
 
       ridelog calibrate --vehicle rav4-2009
@@ -244,14 +244,14 @@ class ModesQuestion(Question):
         "columns of the sensors (default: all but t_s, the input, and a drive's speed, distance and position)",
         metavar="A,B,...", read=_columns)] = None
     input_column: Annotated[str | None, Option("column of the measured input", metavar="COLUMN", flag="--input")] = None
-    from_s: Annotated[float | None, Option("leave out what is before this t_s [s]", metavar="S")] = None
-    to_s: Annotated[float | None, Option("leave out what is after this t_s [s]", metavar="S")] = None
+    from_s: Annotated[float | None, Option("start of the part to analyse, as t_s [s]", metavar="S")] = None
+    to_s: Annotated[float | None, Option("end of that part, as t_s [s]", metavar="S")] = None
     vehicle: Annotated[Vehicle | None, Option(
         "the modes of a vehicle's file; with a FILE, the vehicle that was driven", metavar="NAME|FILE",
         read=str)] = None
     speed_mps: Annotated[float | None, Option(
-        f"of a vehicle alone: at which nonlinear forces are linearised (default: {COMMON_SPEED_MPS:g}); of a "
-        "FILE: at which it was driven, if it does not say so", SPEED, "MPS")] = None
+        f"without a FILE: speed at which nonlinear forces are linearised (default: {COMMON_SPEED_MPS:g}); with a "
+        "FILE that has no speed: speed of the drive", SPEED, "MPS")] = None
 
 
 @dataclass(frozen=True)
@@ -285,9 +285,10 @@ ESTIMATE = Verb(EstimateQuestion, "logger.api.drives:estimated", (
 MODES = Verb(ModesCommand, "logger.api.modal:asked_modes", (PICTURES,))
 
 
-_OBSTACLES = ("add one to the road [m]; may repeat. bump (Eq 4.41 of Blum 2015): start_m, height_m, width_m; step: "
-              "start_m, height_m; ramp: and length_m; plate: start_m, height_m, length_m[, edge_m]; pothole: start_m, "
-              'depth_m, length_m[, edge_m]. In Python: {"bump": {"start_m": 20, "height_m": 0.08, "width_m": 3.6}}')
+_OBSTACLES = ("add an obstacle to the road [m]; may repeat. bump (Eq 4.41 of Blum 2015): start_m, height_m, width_m; "
+              "step: start_m, height_m; ramp: start_m, height_m, length_m; plate: start_m, height_m, length_m[, "
+              "edge_m]; pothole: start_m, depth_m, length_m[, edge_m]. "
+              'In Python: {"bump": {"start_m": 20, "height_m": 0.08, "width_m": 3.6}}')
 
 
 @dataclass(frozen=True)
@@ -302,13 +303,13 @@ class SimulateQuestion(Question):
       ridelog simulate --vehicle ./rig.yaml --excitation run/excitation.csv --rate 500 --out run/drive.csv
 
     The drive is CSV: t_s,accel_z_mps2,speed_mps,distance_m, then what --output asks for. It starts with the front tires
-    at the start of the profile, after a flat road, ends a second after the last wheel has left it, and is sampled as a
-    recorder does it, behind a filter that is flat up to 0.38 of the sample rate. A folder that holds a drive.csv and
+    at the start of the profile, after a flat road, and ends a second after the last wheel has left it. It is sampled
+    behind an anti-alias filter that is flat up to 0.38 of the sample rate. A folder that holds a drive.csv and
     the profile.csv it was driven on is a run. A rig that is driven by time (--excitation) has no speed and no distance;
     its drive.csv lasts as long as the excitation.csv beside it.
 
     Physical effects are those of the vehicle's file, then those of --effect; docs/reference/effects.md lists them. The
-    speed asked for is the true one: with speed_scale the drive's own columns say something else.
+    speed asked for is the true one: with speed_scale the recorded speed differs.
 
     In Python: a run. Raises BadInput for what no car can do, obstacles that do not lie on the road, and as
     ``read_vehicle`` and ``read_profile``.
@@ -331,8 +332,7 @@ class SimulateQuestion(Question):
         _OBSTACLES, metavar="NAME:PARAM=VALUE,...", read=str, many=list, flag="--obstacle")] = None
     rate_hz: Annotated[float, Option("samples a second", RATE, "HZ")] = 100.0
     noise_mps2: Annotated[float, Option("r.m.s. of the sensor's noise [m/s2]", ADDED, "MPS2")] = 0.0
-    step_mps2: Annotated[float, Option("step of the sensor: readings are whole multiples of it "
-                                       "[m/s2]", ADDED, "MPS2")] = 0.0
+    step_mps2: Annotated[float, Option("quantisation step of the sensor [m/s2]", ADDED, "MPS2")] = 0.0
     seed: Annotated[int, Option("seed of the noise (default: 1)", Range(0, float("inf")), "N")] = 1
     name: Annotated[str, "of the run; each of several needs its own"] = "simulated"
 
@@ -367,8 +367,8 @@ class SimulateCommand(SimulateQuestion):
         f"left one. A number: a flat road of this length, {_FLAT.words}", metavar="FILE|M",
         read=_file_or("m"))] = None  # type: ignore[assignment]
     speed_mps: Annotated[float | Path | None, Option(
-        f"constant, {SPEED.words}; or a CSV with t_s,speed_mps, straight lines between them: the drive "
-        "then lasts as long as the file", metavar="MPS|FILE", read=_file_or("m/s"))] = None  # type: ignore[assignment]
+        f"constant, {SPEED.words}; or a CSV with t_s,speed_mps, interpolated linearly: the drive lasts as "
+        "long as the file", metavar="MPS|FILE", read=_file_or("m/s"))] = None  # type: ignore[assignment]
     _: KW_ONLY
     excitation: Annotated[Path | None, Option(
         "for a test rig, in place of --profile and --speed: the elevation under its wheels over time, as CSV "
@@ -402,7 +402,7 @@ class SimulateCommand(SimulateQuestion):
 
 SIMULATE = Verb(SimulateCommand, "logger.api.simulation:simulation", (
     Out("drive to write; a file called profile.csv: the road that was driven, with its obstacles. Both in one folder "
-        "are a run. FILE.html, .png, .svg or .pdf: pictures; may repeat", metavar="FILE", others=("*",),
+        "form a run. FILE.html, .png, .svg or .pdf: pictures; may repeat", metavar="FILE", others=("*",),
         required=True),))
 
 
@@ -541,11 +541,11 @@ class LearnCarQuestion(LongQuestion):
       ridelog learn-car /var/lib/ridelog --wheelbase 2.66 --out mycar.yaml
       ridelog learn-car run1 run2 --wheelbase 2.66 --mass 1450 --sensor ahead_m=0.3 --out mycar.yaml
 
-    It begins with what published cars have in common, and finds the natural frequencies and damping ratios of body and
+    It starts from the average of published cars and finds the natural frequencies and damping ratios of body and
     wheels, together with the level and waviness of each road. It holds out each drive in turn to show the error on a
-    drive that no fit saw; the file comes from all drives. Masses, springs and dampers share a scale that the IRI does
-    not need: without --mass it is a convention. learn-car refuses what does not fit (exit status 1): a wrong wheelbase,
-    drives of two cars, readings of another axis. It names a worn damper, friction and a trailer.
+    new drive; the file comes from all drives. Drives show only the ratios of masses, springs and dampers, and the IRI
+    needs no more: without --mass a typical mass is assumed. learn-car refuses what does not fit (exit status 1): a
+    wrong wheelbase, drives of two cars, readings of another axis. It names a worn damper, friction and a trailer.
 
     In Python: raises BadInput for drives that cannot be read or are too short, CheckFailed for those that fit no car.
     """
@@ -555,12 +555,13 @@ class LearnCarQuestion(LongQuestion):
     wheelbase_m: Annotated[float, Option("distance between the axles [m]", _WHEELBASE, "M")]
     _: KW_ONLY
     mass_kg: Annotated[float | None, Option(
-        "mass of the whole car as driven [kg] (default: a convention)", _CAR_MASS, "KG")] = None
+        "mass of the whole car as driven [kg] (default: a typical one, as the IRI does not need it)", _CAR_MASS,
+        "KG")] = None
     sensor: Annotated[float | None, Option(
         "ahead_m=M: how far the sensor sits ahead (+) of the car's middle, to 0.2 m (default: near its centre of "
         "gravity)", metavar="ahead_m=M", read=_ahead)] = None
     compare: Annotated[Path | None, Option(
-        "a vehicle file that was learnt before: say what has changed since", metavar="FILE.yaml", read=Path)] = None
+        "an earlier vehicle file of this car: report what has changed", metavar="FILE.yaml", read=Path)] = None
 
 
 LEARN_CAR = Verb(LearnCarQuestion, "logger.api.learn_car:learned", (

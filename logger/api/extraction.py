@@ -356,7 +356,7 @@ def _drives(recorded: Recorded, measured: MeasuredProfile | None) -> tuple[list[
         *recorded.left_out,
         LeftOut(max(0.0, seconds["unknown"]), "s",
                 f"without a fix for more than {config.gps.bridge_s:g} s, or at an end"),
-        LeftOut(seconds["parked"], "s", "of a parked car"),
+        LeftOut(seconds["parked"], "s", "parked"),
         LeftOut(max(0.0, seconds["driven"] - laid_s), "s", "off the profile" if measured else "between two runs"),
         LeftOut(laid_s - long_s, "s", f"in stretches of less than {LEAST_S:g} s or {LEAST_M:g} m"),
         LeftOut(long_s - kept_s, "s", "without a good reading: the sensor gave none, or clipped")))

@@ -269,11 +269,12 @@ def _uneven_dampers(car: LearnedCar) -> Iterator[str]:
     at = COORDINATES.index("dampers.unevenness")
     uneven, std = abs(float(car.x[at])), float(car.std[at])
     if uneven > _SIGMA * std and uneven >= 1:  # such a damper would push the wheel on
-        yield ("The wheel hop has stronger harmonics than dampers that resist one way only would cause. A measured "
-               "street and ridelog diagnose may show what causes them.")
+        yield ("The harmonics of wheel hop are stronger than even dampers that act in one direction only would cause. "
+               "A measured street and ridelog diagnose may show what causes them.")
     elif uneven > _SIGMA * std:
-        yield (f"Dampers are uneven: {(1 + uneven) / (1 - uneven):.2g} ± {2 * std / (1 - uneven) ** 2:.1g} times as "
-               "hard one way as the other. A measured street and ridelog diagnose show which way (damper_asymmetry).")
+        yield ("The dampers are asymmetric: bump and rebound damping differ by a factor of "
+               f"{(1 + uneven) / (1 - uneven):.2g} ± {2 * std / (1 - uneven) ** 2:.1g}. A measured street "
+               "and ridelog diagnose show which is larger (damper_asymmetry).")
 
 
 def _not_linear(much: LearnedCar, little: LearnedCar) -> str:
@@ -487,10 +488,10 @@ def _kept_lines(errors: Mapping[str, Any]) -> Iterator[str]:
 
 def _mass_line(question: LearnCarQuestion, mass: float) -> str:
     if question.mass_kg is None:
-        return ("Masses, springs and dampers share a scale that drives do not show and the IRI does not need. By "
-                f"convention it is {mass:.0f} kg on the springs of one side; --mass sets that of your car.")
-    return (f"Masses, springs and dampers are those of a car of {question.mass_kg:g} kg: {mass:.0f} kg on the springs "
-            "of one side.")
+        return ("Drives show only the ratios of masses, springs and dampers, and the IRI needs no more. Assumed: a "
+                f"sprung mass of {mass:.0f} kg per side; --mass gives that of your car.")
+    return (f"Masses, springs and dampers are those of a car of {question.mass_kg:g} kg: a sprung mass of {mass:.0f} "
+            "kg per side.")
 
 
 def _warnings(problem: UnknownCar, car: LearnedCar, values: Mapping[str, float], deviations: Mapping[str, float]

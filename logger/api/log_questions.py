@@ -153,7 +153,7 @@ class ConvertQuestion(LogsQuestion):
       ridelog convert /media/RIDELOG --smoothness ways.geojson --to review.geojson
 
     With --smoothness each row is a way of OpenStreetMap that was driven: the value of its key smoothness that the IRI
-    suggests, how sure that is, and what is tagged. It is for a person to look through; nothing is sent anywhere.
+    suggests, how sure that is, and the present tag. Review the file before you use it; nothing is uploaded.
 
     In Python: raises BadInput for another ending, a missing extra, no log or none with an intact row, a file without
     ways, and where none of them was driven.
@@ -239,8 +239,8 @@ Dataset = Annotated[Path | str, Argument("folder that 'fleet ingest' has made", 
 
 @dataclass(frozen=True)
 class SummariseQuestion(FleetQuestion):
-    """Summarise roads and cars: mean IRI with its standard error, change and comfort by road; how much too high a car
-    reads, from the roads that cars share.
+    """Summarise roads and cars: mean IRI with standard error, change and comfort by road; the bias of each car, from
+    the roads that cars share.
 
       ridelog fleet summarise county --by section --out sections.csv
       ridelog fleet summarise county --since 2026-01-01 --public 3
@@ -262,7 +262,7 @@ class SummariseQuestion(FleetQuestion):
 @dataclass(frozen=True)
 class ReportQuestion(FleetQuestion):
     """Write a folder that opens without a server: a page with a map and lists (index.html), tiles of the map, and the
-    segments and sections of 0.1 mi as GeoParquet and CSV. It is there whole, in place of an older one, or not at all.
+    segments and sections of 0.1 mi as GeoParquet and CSV. It replaces an older report as a whole, or not at all.
 
       ridelog fleet report county --out map/
       ridelog fleet report county --out map/ --public 3

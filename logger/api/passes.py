@@ -285,8 +285,8 @@ def _summary(found: CombinedDrives) -> Iterator[str]:
         yield (f"Whole drives differ by {found.scatter.drive:.1%} of the IRI and single passes by "
                f"{found.scatter.passes:.1%}, beyond the errors of their windows; the standard errors include both")
         if found.scatter.alike > 0:
-            yield (f"All drives over a place share {found.scatter.alike:.0%} of the variance of their windows' errors; "
-                   "more drives do not reduce that part")
+            yield (f"{found.scatter.alike:.0%} of the error variance is common to all drives; more drives do not "
+                   "reduce it")
     else:
         yield ("No two drives passed the same piece, so the standard errors do not include how whole drives differ "
                "(tires, load, temperature)")

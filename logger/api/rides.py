@@ -285,7 +285,7 @@ def _conclusions(result: RideComfort) -> list[str]:
     if result.weighting.is_sickness:
         lines.append(f"Motion sickness dose: {_sickness_dose(result.vertical):.3f} m/s1.5.")
     elif not result.weighting.comfort_words:
-        lines.append(f"Comfort: ISO 2631-1 has no words for {result.weighting.name.capitalize()}.")
+        lines.append(f"Comfort: ISO 2631-1 has no comfort scale for {result.weighting.name.capitalize()}.")
     elif len(result.axes) > 1:
         totals = _totals(result)
         lines.append(f"Feels {_spoken(totals['total_comfort'])}: a_w {totals['total_a_w_mps2']:.3f} m/s2 over three "

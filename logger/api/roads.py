@@ -276,7 +276,7 @@ def iri_blocks(result: ProfileIri, profile: Profile, name: str) -> list[Block]:
                      f"{row[first] / INCH_PER_MILE_M_PER_KM:.1f}", "partial" if window.partial else ""))
     heads = ("from m", "to m", "from ft", "to ft", *(f"{_HEADS[key]} m/km" for key in whole), "in/mi", "")
     resampled = [] if profile.widest_step_m is None else [
-        f"Resampled: straight lines between samples up to {profile.widest_step_m:.3g} m apart."]
+        f"Resampled: interpolated between samples up to {profile.widest_step_m:.3g} m apart."]
     return [
         Lines([
             ", ".join(f"{_HEADS[key]} {value:.3f} m/km ({value / INCH_PER_MILE_M_PER_KM:.1f} in/mi)"

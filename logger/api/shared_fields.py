@@ -35,17 +35,18 @@ Anyway = Annotated[bool, Option("go on although a run seems to be of another roa
 TrackedRuns = Annotated[Runs, Argument(
     "folder with drive.csv and profile.csv (of a rig: excitation.csv)", metavar="RUN", read=Path, many=list)]
 Tolerance = Annotated[float | str | None, Option(
-    "how well the vehicle's masses, springs and dampers are known where its file does not say: one standard "
-    f"deviation, as a share (default: {USUAL_TOLERANCE:g}; of lengths 0.02). {UNKNOWN}: no parameter is known",
+    "how far the vehicle's masses, springs and dampers may be off where its file does not say, as a share (default: "
+    f"{USUAL_TOLERANCE:g}; the standard deviation is 0.625 of it, and of lengths 0.02). {UNKNOWN}: no parameter is "
+    "known",
     metavar=f"SHARE|{UNKNOWN}", read=word_or_number(UNKNOWN, TOLERANCE),
     check=check_word_or_number(UNKNOWN, TOLERANCE))]
 Candidates = Annotated[Collection[str] | None, "names of the effects to be tried; None: all"]
 LowPass = Annotated[float | None, Option(
-    "leave out higher frequencies, for example above 20, in record and model; errors refer to the rest (default: "
-    "the whole record; ridelog recognises a low-passed record and says so)", metavar="HZ")]
+    "compare record and model up to this frequency only, such as 20 (default: the whole band; ridelog recognises a "
+    "low-passed record)", metavar="HZ")]
 EffectFiles = Annotated[Sequence[Path | str], Option(
-    "a Python file with an effect of your own, to be tried as well; may repeat. Or the name of one of ridelog's "
-    "effects that it would not try on these runs by itself, such as play",
+    "a Python file with an effect of your own, to be tried as well; may repeat. Or the name of a built-in effect that "
+    "is not tried on these runs by default, such as play",
     metavar="FILE.py", read=Path, many=list, flag="--effect-file")]
 
 

@@ -135,5 +135,5 @@ def checks_lines(record: EvenRecord) -> list[str]:
         return left_out_lines(record.left_out)
     dropped = f"{done.repeats_dropped:.0%} repeated samples dropped, then " if done.repeats_dropped else ""
     return [*left_out_lines(record.left_out),
-            f"Resampled: {dropped}laid from {done.from_hz:.4g} Hz (steps up to {done.widest_step_s:.3g} s) on an even "
-            f"grid of {done.to_hz:.4g} Hz, through an anti-alias filter."]
+            f"Resampled: {dropped}converted from {done.from_hz:.4g} Hz (steps up to {done.widest_step_s:.3g} s) to an "
+            f"even {done.to_hz:.4g} Hz, through an anti-alias filter."]

@@ -86,7 +86,7 @@ class Simulation(CommandResult):
         elif isinstance(self.track, Track):
             drive_file.write_profile(path, self.track)
         else:
-            raise BadInput(f"{option} {path}: a rig stands, and has no road")
+            raise BadInput(f"{option} {path}: a rig has no road")
 
 
 def simulation(question: SimulateCommand) -> Simulation:

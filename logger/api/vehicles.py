@@ -391,6 +391,6 @@ def blocks(found: Calibrated) -> list[Block]:
                f"{LEVELS_IRI[0]:g} to {LEVELS_IRI[-1]:g} m/km"]),
         Table(("m/s", "mph", "IRI/rms", "spread", "R2", "IRI/rms*", "spread", "R2", "rms/root Gd", "a_w/IRI",
                "from IRI"), rows, ()),
-        Lines([f"*: of windows of {settings.window_m:.4g} m, the others of whole roads.",
-               "IRI [m/km] = IRI/rms x r.m.s. vertical acceleration [m/s2]; 68 of 100 lie within the spread.",
-               f"ISO 2631-1 calls the ride '{_COMFORT_WORD}' from the last column's IRI on."])]
+        Lines([f"* for windows of {settings.window_m:.4g} m; the other columns are for whole roads.",
+               "IRI [m/km] = IRI/rms x r.m.s. vertical acceleration [m/s2]; 68 % lie within the spread.",
+               f"From the IRI in the last column on, ISO 2631-1 calls the ride {_COMFORT_WORD}."])]

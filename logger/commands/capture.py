@@ -37,8 +37,8 @@ class CaptureQuestion(Question):
       ridelog capture /dev/ttyUSB0 --out sensor.dump.gz
       ridelog capture /dev/ttyACM0 --baud 9600 --seconds 60 --out receiver.dump.gz
 
-    For an instrument whose frames nobody knows yet: what comes is kept byte by byte, and the first look that is printed
-    at the end shows what kind of frames it may be. End it with Ctrl-C.
+    For an instrument with an unknown protocol: every byte is kept, and a summary at the end shows what the frames may
+    be. End it with Ctrl-C.
     """
 
     port: Annotated[str, Argument("serial port, such as /dev/ttyUSB0", metavar="PORT")]

@@ -27,9 +27,10 @@ class ExportQuestion(Question):
       sudo ridelog export --to /media/RIDELOG
       sudo ridelog export --to /mnt/backup --json
 
-    Everything goes into ridelog/<this logger> on the stick, with a manifest that 'ridelog verify' checks. What is there
-    already is read and left alone. If the settings pair the logger with sticks, only a copy to a paired one counts as
-    an export. Exit status 0: all finished logs are there and marked; 1: not so, and why; 2: wrong use.
+    Everything goes into ridelog/<this logger> on the stick, with a manifest that 'ridelog verify' checks. Files that
+    are there already are checked and left alone. If the settings pair the logger with sticks, only a copy to a paired
+    stick counts as an export. Exit status 0: all finished logs are there and marked; 1: they are not, and why; 2: wrong
+    use.
     """
 
     to: Annotated[Path | None, Option("the stick, or any other folder", metavar="DIR", read=Path)] = None

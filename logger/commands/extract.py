@@ -14,7 +14,7 @@ from logger.question import Argument, Checked, LongQuestion, Option, Range, Seve
 if TYPE_CHECKING:
     from logger.api.extraction import Extracted
 
-CSV_OPTIONS = ("columns", "location", "up", "sign", "range_g", "speed_mps")
+CSV_OPTIONS = ("columns", "location", "up", "speed_mps")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,7 +23,7 @@ class ExtractQuestion(LongQuestion):
 
     Each continuous drive of a dump becomes a folder DIR/NAME, DIR/NAME-2, ... with drive.csv and run.yaml. With
     --profile, a measured line with lat_deg,lon_deg, a run holds only what was driven on that line, by the line's own
-    distance: first from the GPS positions, then from the road as the car felt it. profile.csv then lies beside
+    distance: located first by GPS, then by matching the car's response to the profile. profile.csv then lies beside
     drive.csv.
 
       ridelog extract drive.dump.gz --out runs --profile line.csv
@@ -37,7 +37,7 @@ class ExtractQuestion(LongQuestion):
       ridelog extract --csv ride.csv --location gps.csv --out runs
       ridelog extract --csv log.csv --out runs --columns "t=time:ms,x=ax:g,y=ay:g,z=az:g,lat=lat,lon=lon,speed=v:km/h"
 
-    Exit status 1: extract could not use one of several recordings; it names it and processes the others.
+    Exit status 1: a recording could not be used; extract names it and processes the others.
     """
 
     dumps: Annotated[list[Path] | tuple[Path, ...], Argument("recorded drive (.dump or .dump.gz)", metavar="DUMP",
@@ -57,18 +57,12 @@ class ExtractQuestion(LongQuestion):
         "with --csv: the file with the speed or position of the recording, on the same clock", metavar="FILE.csv",
         read=Path)] = None
     columns: Annotated[str | None, Option(
-        "with --csv: which columns are what: t (s, ms, us, ns, iso), x y z or up, the acceleration (m/s2, g, mg), gx "
+        "with --csv: the columns to read: t (s, ms, us, ns, iso), x y z or up, the acceleration (m/s2, g, mg), gx "
         "gy gz, gravity, lat, lon, speed (m/s, km/h, mph, kn). Without a unit: the one at the end of the column's "
         "name, or what gravity and the clock show", metavar="ROLE=COLUMN[:UNIT],...")] = None
     up: Annotated[str | None, Option(
         "with --csv: for a record without gravity, the axis that points up (write --up=-z)",
         choices=("x", "y", "z", "-x", "-y", "-z"))] = None
-    sign: Annotated[str | None, Option(
-        "with --csv, -: change the sign of the acceleration, for a program that gives gravity the opposite sign (write "
-        "--sign=-)", choices=("+", "-"))] = None
-    range_g: Annotated[float | None, Option(
-        "with --csv: range of the sensor, at whose ends readings are marked as clipped (default: ridelog recognises "
-        "it)", Range(0.5, 1000, "g"), "G", flag="--range")] = None
     speed_mps: Annotated[float | None, Option(
         "with --csv: the constant speed of a recording that has none", Range(0.5, 100, "m/s"), "MPS")] = None
 
@@ -130,7 +124,7 @@ def _extractor(asked: ExtractQuestion) -> "Callable[[Path], Extracted]":
         raise BadInput(f"{again}: expected {'recordings' if asked.csv else 'dumps'} of different names, so that each "
                        "has a folder of its own")
     settings = CsvSettings(named_columns(asked.columns) if asked.columns is not None else None, asked.location,
-                           asked.up, -1.0 if asked.sign == "-" else 1.0, asked.range_g, asked.speed_mps, asked.vehicle)
+                           asked.up, asked.speed_mps, asked.vehicle)
     config = load_config(asked.config) if asked.config else None
     measured = read_measured_profile(asked.profile) if asked.profile else None
     if asked.csv:
@@ -152,8 +146,8 @@ def lines(source: Path, found: "Extracted") -> list[str]:
             words += f"; corrected for a GPS delay of {one.delay_s:.2f} ± {one.delay_std_s:.2f} s"
         printed.append(words)
         if (scale := one.unusual_speed_scale) is not None:
-            printed.append(f"{one.run}: removed: speeds that are {100 * scale[0]:.2f} ± {100 * scale[1]:.2f} % of "
-                           "those on the profile; a receiver's are not so far off: is the profile's distance_m right?")
+            printed.append(f"{one.run}: corrected speeds that were {100 * scale[0]:.2f} ± {100 * scale[1]:.2f} % of "
+                           "those on the profile. A receiver is not that far off: is the profile's distance_m right?")
     printed += [f"{source}: {words}" for words in left_out_lines(found.left_out)]
     if found.torn_tail:
         printed.append(f"{source}: the recording was cut short; everything before the cut was used")

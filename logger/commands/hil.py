@@ -36,10 +36,10 @@ class HilQuestion(LongQuestion):
       ridelog hil drive.dump.gz --nmea-port /dev/ttyUSB0 --accelerometer-port /dev/ttyUSB1
       ridelog hil drive.dump.gz --log hil-log
 
-    The bytes go out with their recorded timing. At the other end of the wires (two USB-serial adapters, or
-    pseudo-terminals) a service that has just been started listens. Its log is compared with a replay of the same bytes
-    under the same settings. With ports and --log: play, then compare. With ports alone: only play, for a service on
-    another machine. With --log alone: only compare, with a copy of its folder.
+    The bytes go out with their recorded timing, over two USB-serial adapters or pseudo-terminals, to a service that has
+    just been started. Its log is compared with a replay of the same bytes under the same settings. With ports and
+    --log: play, then compare. With ports alone: only play, for a service on another machine. With --log alone: only
+    compare, with a copy of its folder.
 
     The readings of a chip such as the BMA220 are sent as a bridge microcontroller would: as lines, profile `lines`.
     Exit status 1 when the log does not agree, or the bytes were sent too late to decide.

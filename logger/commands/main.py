@@ -66,7 +66,7 @@ GROUPS = {
         "lab": "compare, diagnose and add effects until nothing is missing; write a page of it",
     },
     "Proof and hardware": {
-        "study": "recompute a printed table or figure: does it agree with the print?",
+        "study": "recompute a published table or figure: does it agree?",
         "hil": "play a recorded drive into serial ports and check the log of the running service",
         "fixed-point": "write the filters as C headers for integer arithmetic",
     },

@@ -48,11 +48,11 @@ class ReportQuestion(Question):
         many=list)]
     out: Annotated[Path, Option("page to write", metavar="FILE.html", read=Path, check=_web_page)]
     base: Annotated[Path | None, Option(
-        "roads as background, such as an extract of OpenStreetMap, kept in the page",
+        "roads as background, such as an extract of OpenStreetMap, stored in the page",
         metavar="ROADS.geojson", read=Path)] = None
     tiles: Annotated[str, Option(
-        "draw pictures of streets beneath the drives: the page then asks a server for them (with {z}, {x} and {y} in "
-        "the address; by default OpenStreetMap's)", metavar="ADDRESS", bare=STREETS, check=_tiles)] = ""
+        "draw a street map beneath the drives; the page then loads it from a server (ADDRESS with {z}, {x} and {y}; "
+        "default: OpenStreetMap's)", metavar="ADDRESS", bare=STREETS, check=_tiles)] = ""
 
 
 VERB = Verb(ReportQuestion, "logger.commands.report:reported")

@@ -57,7 +57,7 @@ def screen(status: ServiceStatus | None, fault: str | None) -> list[str]:
     """The lines a person sees. ``fault`` is what ``trouble`` said."""
     if status is None or fault is not None:
         return [fault or "", "", "What to do", *(f"  {line}" for line in (_START, _JOURNAL))]
-    stands = "what the receiver says is doubtful" if status.gps.state == "doubtful" else "the car stands"
+    stands = "the receiver's data are doubtful" if status.gps.state == "doubtful" else "the car stands"
     words = {"starting": "is starting", "standing": f"is ready; {stands}", "recording": "is recording",
              "stopping": "is stopping"}
     writes = f", but writes NOTHING: {status.storage.trouble}" if status.storage.trouble else ""

@@ -32,7 +32,7 @@ class StudyQuestion(LongQuestion):
       ridelog study field --out studies
       ridelog study lira-cd DIR --vehicle mycar.yaml
 
-    Each printed item ends in one of four words: agrees, misprint, better, not reproducible. Where the dissertation
+    Each item gets one of four verdicts: agrees, misprint, better, not reproducible. Where the dissertation
     measured, the study simulates under the conditions that its text gives: the records were never published.
     """
 

@@ -15,8 +15,8 @@ _COUNTS = ("records_good", "records_torn", "records_corrupt", "gaps")
 @dataclass(frozen=True, kw_only=True)
 class VerifyQuestion(Question):
     """Check segment logs and recorded dumps: count good, torn and corrupt records, and gaps. A stick that 'ridelog
-    export' filled is also compared with its manifest. There each file is a record, and each file missing or not listed
-    is a gap.
+    export' filled is also compared with its manifest: each file then counts as a record, and each missing or unlisted
+    file as a gap.
 
       ridelog verify /var/lib/ridelog
       ridelog verify /media/RIDELOG --json

@@ -100,7 +100,7 @@ def tilt_complaint(now: Sitting, column: int, sign: float) -> str:
     std_deg = hypot(degrees(now.gravity_std_rad), ZERO_ERROR_DEG)
     if tilt_deg > WRONG_AXIS_DEG:
         felt = axis_word(now.gravity)
-        return f"gravity is felt along {felt}, not along {word}: set vertical_axis: {felt}, or mount it as it was meant"
+        return f"gravity is felt along {felt}, not along {word}: set vertical_axis: {felt}, or turn the sensor"
     if tilt_deg > TILT_DEG + std_deg:
         return f"it is tilted by {tilt_deg:.0f} ± {std_deg:.0f} degrees: mount it level"
     return ""

@@ -106,20 +106,17 @@ class EvenSamples:
     holds_s: tuple[float, ...] = ()
 
 
-def clipped_samples(samples: Array, range_end: float | None) -> Bools:
-    """Which samples (n, axes) stand at an end of the range on some axis (n,): of the one that is known, or of one that
-    is plain to see (``dsp.repeated_samples``)."""
+def clipped_samples(samples: Array) -> Bools:
+    """Which samples (n, axes) stand at an end of the range on some axis (n,), as ``dsp.repeated_samples`` sees it."""
     found = np.zeros(len(samples), dtype=np.bool_)
     for axis in samples.T:
         half = 0.5 * resolution(axis)
-        if range_end is not None:
-            found |= np.abs(axis) >= range_end - half
         for one in range_ends(axis):
             found |= np.sign(one.at) * axis >= abs(one.at) - half
     return found
 
 
-def even_samples(time_s: Array, samples: Array, rate_hz: float, range_end: float | None = None) -> EvenSamples:
+def even_samples(time_s: Array, samples: Array, rate_hz: float) -> EvenSamples:
     """Lay samples (n, axes) at times (n,), not decreasing [s], on a grid. ValueError where that cannot be.
 
     Problem: a phone samples at 51, 104 or 417 Hz, unevenly, writes each reading several times, gives times in bursts,
@@ -132,7 +129,7 @@ def even_samples(time_s: Array, samples: Array, rate_hz: float, range_end: float
         raise ValueError(f"expected {_FEWEST} samples or more without a pause of {LONGEST_HOLE_S:g} s, found none")
     held = find_holds(time_s, samples)
     whole = [_taken(time_s[part], samples[part], held[part]) for part in pieces]
-    clipped = clipped_samples(np.concatenate([one[1] for one in whole]), range_end)
+    clipped = clipped_samples(np.concatenate([one[1] for one in whole]))
     ends = np.cumsum([len(one[0]) for one in whole])[:-1]
     taken = [(one[0][part], one[1][part], ends_met[part]) for one, ends_met in zip(whole, np.split(clipped, ends),
                                                                               strict=True) for part in _pieces(one[0])]

@@ -325,7 +325,7 @@ _STYLE = """
 _LIMITS_M_PER_KM = tuple(limit * INCH_PER_MILE_M_PER_KM for limit in (GOOD_BELOW_IN_PER_MI, FAIR_TO_IN_PER_MI))
 """Of colours: those by which a section is rough, so that the map and the list of visits say the same."""
 _MODES = (("m", "Mean IRI"), ("w", "Roughest"), ("t", "Became worse"))
-_HINT = "Tap or click a piece of road for its figures; zoom in for finer pieces."
+_HINT = "Tap or click a piece of road for its figures; zoom in for more detail."
 
 
 def fleet_page(figures: FleetFigures, sections: RoadTable) -> doc.Html:

@@ -131,8 +131,8 @@ def unexplained(error: float) -> list[Finding]:
     if error < _EXPLAINS_NOTHING:
         return []
     return [Finding(UNEXPLAINED, {}, f"the model explains nothing of what was measured, even at its best (NRMSE "
-                    f"{error:.2f}): check that the road, the place on it, the excitation and the vehicle are the right "
-                    "ones.")]
+                    f"{error:.2f}): check that the road, the position on it, the excitation and the vehicle are the "
+                    "right ones.")]
 
 
 def upside_down(error: float, turned_error: float) -> list[Finding]:
@@ -141,7 +141,7 @@ def upside_down(error: float, turned_error: float) -> list[Finding]:
     if turned_error > _CLEARLY_LESS * error:
         return []
     return [Finding(TURNED, {}, f"the acceleration seems upside down (up is positive): the NRMSE is {error:.2f}, and "
-                                f"{turned_error:.2f} with the sign changed. Or a step has the wrong sign or place.")]
+                                f"{turned_error:.2f} with the sign changed. Or a step has the wrong sign or position.")]
 
 
 def _together(names: Sequence[str], direction: Array, trace: Array) -> Finding:

@@ -177,8 +177,8 @@ def _why_not(pole: complex, frequency_std_hz: float, damping_std: float, moves: 
     reasons = {
         "it is absent from parts of the record": not np.isfinite(frequency_std_hz),
         "it grows instead of decaying": ratio <= 0,
-        "damped so heavily that it hardly swings": ratio > _MOST_DAMPING,
-        "no damping to be seen: a hum, not a mode": ratio < max(no_damping, min(hum_damping, 2 * damping_std)),
+        "damped so heavily that it hardly oscillates": ratio > _MOST_DAMPING,
+        "no measurable damping: a hum, not a mode": ratio < max(no_damping, min(hum_damping, 2 * damping_std)),
         f"its frequency is uncertain by {frequency_std_hz / hz:.0%}": frequency_std_hz > LARGEST_FREQUENCY_ERROR * hz,
         f"its damping ratio is uncertain by {damping_std:.2f}": damping_std > LARGEST_DAMPING_ERROR,
         f"only {len(moves)} of the next {models} orders have it": len(moves) < min(must_have_it, models),

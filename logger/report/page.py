@@ -361,7 +361,7 @@ def _curves_view() -> doc.Html:
 _READOUT = doc.Html(
     '<div class="readout"><div id="reading" aria-live="polite"><p class="hint">Point at a window, or tap it. Drag over '
     'the curves for the figures of a range.</p></div><div id="range" hidden><div id="figures" aria-live="polite"></div>'
-    '<p class="actions"><button type="button" id="range-look">Look at it</button>'
+    '<p class="actions"><button type="button" id="range-look">Zoom to it</button>'
     '<button type="button" id="look-all">Whole drive</button>'
     '<button type="button" id="range-clear">Clear the range</button></p></div></div>')
 

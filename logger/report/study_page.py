@@ -48,7 +48,7 @@ def _items(study: Study, result: Result) -> doc.Html:
         checks = max(len(study.checks_of(name, result)) for name in names)
         counted = f" ({checks} check{'s' * (checks > 1)}{' of each' * (len(names) > 1)})" if checks else ""
         lines.append(f"{_joined(names)}: {word_of(study.checks_of(item.name, result))}. {item.because}{counted}")
-    return doc.section("Ours against the print", doc.bullets(lines))
+    return doc.section("Ours against the published values", doc.bullets(lines))
 
 
 def _picture(picture: Picture) -> doc.Html:

@@ -233,7 +233,7 @@ class Result:
         """The checks first, where there are any: numbers, statements, and the print beside itself."""
         numbers = [one for one in self.values if isinstance(one, Value)]
         shown = (("Printed and ours", [one for one in numbers if not one.of_print]),
-                 ("The print beside its own figures", [one for one in numbers if one.of_print]))
+                 ("The publication against its own figures", [one for one in numbers if one.of_print]))
         tables = [_of_numbers(title, some) for title, some in shown if some]
         if statements := [one for one in self.values if isinstance(one, Statement)]:
             tables.insert(min(1, len(tables)), _of_statements(statements))
@@ -241,7 +241,7 @@ class Result:
 
 
 def _of_numbers(title: str, values: Sequence[Value]) -> Table:
-    ours = "from the print" if values[0].of_print else "ours"
+    ours = "as published" if values[0].of_print else "ours"
     rows: tuple[tuple[Cell, ...], ...] = tuple((one.name, *_items(one, values), one.printed, one.ours, one.difference,
                                                 one.tolerance, _stands(one)) for one in values)
     return Table(title, (Column("value"), *_of(values), Column("printed", ".6g"), Column(ours, ".6g"), Column(

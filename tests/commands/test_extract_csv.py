@@ -158,12 +158,10 @@ def test_a_slow_phone_is_reported_and_a_slower_one_refused(drive: DemoDrive, tmp
 
 def test_holes_and_clipped_samples_are_marked(drive: DemoDrive, phone: Phone, tmp_path: Path) -> None:
     hole = (phone.time_s > 30.0) & (phone.time_s < 30.3)
-    kept = Phone(**{**vars(phone), "time_s": phone.time_s[~hole], "force_mps2": phone.force_mps2[~hole]})
-    up = phone.gravity_mps2[0] / np.linalg.norm(phone.gravity_mps2[0])
-    largest = np.abs(kept.force_mps2).max(axis=0)[int(np.argmax(np.abs(up)))]
-    words = phyphox(kept, tmp_path / "ride")
-    run = run_of(called("extract", "--csv", *words, "--out", tmp_path / "runs", "--json",
-                        "--range", 0.97 * largest / 9.80665))
+    end = 0.97 * np.abs(phone.force_mps2[:, int(np.argmax(np.abs(phone.gravity_mps2[0])))]).max()
+    kept = Phone(**{**vars(phone), "time_s": phone.time_s[~hole],
+                    "force_mps2": phone.force_mps2[~hole].clip(-end, end)})
+    run = run_of(called("extract", "--csv", *phyphox(kept, tmp_path / "ride"), "--out", tmp_path / "runs", "--json"))
     found = columns(run)
     inside = (found["t_s"] > 30.02) & (found["t_s"] < 30.28)
     assert (found["usable"][inside] == 0).all()
@@ -186,8 +184,6 @@ def test_gravity_taken_out_needs_the_axis_that_points_up(drive: DemoDrive, phone
     for up, sign in (("--up=z", 1.0), ("--up=-z", -1.0)):
         found = columns(run_of(called("extract", *words, up, "--json")))
         assert (found["accel_z_mps2"] - sign * truth(drive, found["t_s"])).std() < 0.05
-    found = columns(run_of(called("extract", *words, "--up=z", "--sign=-", "--json")))
-    assert (found["accel_z_mps2"] + truth(drive, found["t_s"])).std() < 0.05
     assert "leave out --up" in refused("--csv", tmp_path / "other" / "Accelerometer.csv", "--location",
                                        tmp_path / "ride" / "Location.csv", "--out", tmp_path / "runs", "--up", "z")
 

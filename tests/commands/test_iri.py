@@ -111,7 +111,7 @@ def test_uneven_spacing_is_refused_or_resampled_on_request(
     assert (result["resampled_to_m"], result["widest_step_m"]) == (0.05, pytest.approx(0.1))
     assert result["iri_m_per_km"] == pytest.approx(iri(road[1], SPACING_M), rel=0.02)
     assert main(["iri", str(path), "--resample", "0.05"]) == 0
-    assert "Resampled: straight lines between samples up to 0.1 m apart." in capsys.readouterr().out
+    assert "Resampled: interpolated between samples up to 0.1 m apart." in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(("count", "spacing_m", "arguments", "message"), [

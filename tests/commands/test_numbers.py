@@ -28,12 +28,10 @@ def test_others_are_refused_by_name(within: Range, value: float, complaint: str)
         within.check("--rate", value)
 
 
-@pytest.mark.parametrize(("option", "complaint"), [("--range", "expected 0.5 to 1000 g"),
-                                                   ("--speed", "expected 0.5 to 100 m/s")])
-def test_extract_refuses_numbers_out_of_range(option: str, complaint: str, tmp_path: Path) -> None:
+def test_extract_refuses_numbers_out_of_range(tmp_path: Path) -> None:
     for value in ("0.4", "nan"):
-        with pytest.raises(BadInput, match=f"^{option} {value}: {complaint}$"):
-            main(["extract", "--csv", "ride.csv", "--out", str(tmp_path), option, value])
+        with pytest.raises(BadInput, match=f"^--speed {value}: expected 0.5 to 100 m/s$"):
+            main(["extract", "--csv", "ride.csv", "--out", str(tmp_path), "--speed", value])
 
 
 def test_what_is_no_number_is_said_with_the_unit(tmp_path: Path) -> None:

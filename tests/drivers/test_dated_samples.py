@@ -46,7 +46,7 @@ def test_nothing_is_said_of_samples_that_come_as_they_are_taken(burst: int) -> N
 def test_bursts_that_do_no_harm_are_reported_and_dated_in_time(burst: int) -> None:
     samples, error_ms, age_s = dated(even(100), burst)
     assert samples.doubt("Look.") == ""
-    assert "at a time" in samples.note and "you need do nothing" in samples.note
+    assert "at a time" in samples.note and "nothing needs to be done" in samples.note
     assert samples.burst_s == pytest.approx(burst / 100, rel=0.1)
     assert error_ms < 1
     assert age_s < 1.9  # what is older than 2 s is given up

@@ -150,7 +150,7 @@ def test_status_says_which_rate_was_seen_and_what_to_do(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("burst", "says", "state"), [(30, "you need do nothing", "ok"),
+@pytest.mark.parametrize(("burst", "says", "state"), [(30, "nothing needs to be done", "ok"),
                                                       (100, "send each sample at once", "doubtful")])
 def test_status_says_that_samples_come_in_bursts(tmp_path: Path, burst: int, says: str, state: str) -> None:
     """A bridge that keeps a burst of lines and sends them together."""

@@ -281,7 +281,7 @@ def _other_roads(runs: SimulatedRuns, followed: _Followed, car: Car, rig: Likeli
             continue
         what = "a record that follows its excitation" if run.timed else "a drive that follows the road of its profile"
         yield (f"{run.name}: expected {what}, found one that does not (correlation {found.correlation:.2f} around the "
-               f"body's bounce; chance gives up to {found.chance:.2f}): {_advice(run, car, followed.band_hz)}")
+               f"body bounce; chance gives up to {found.chance:.2f}): {_advice(run, car, followed.band_hz)}")
 
 
 def _is_coherent(run: Run, car: Car) -> bool:

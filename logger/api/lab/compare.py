@@ -470,7 +470,7 @@ def _alignment(found: LabComparison) -> Detail:
 def _by_part(found: LabComparison) -> Iterator[Block]:
     plain, refitted = found.plain.where, found.refitted.where
     yield _table("By band", "Hz", plain.frequency, refitted.frequency)
-    yield Hint("Share: of the residual's power. Filed: with the vehicle file unchanged.")
+    yield Hint("Share: of the residual's power. Unchanged: with the vehicle file as it is.")
     yield _table("By speed", "m/s", plain.speed, refitted.speed)
     yield _table("By amplitude of the motion", found.plain.residuals.unit, plain.amplitude, refitted.amplitude)
 
@@ -481,7 +481,7 @@ def _table(title: str, unit: str, plain: Sequence[Part], refitted: Sequence[Part
              Linked("", doc.html('<div class="bar"><span class="f0" style="width:{:.1%}"></span></div>', part.share)),
              f"{part.share:.1%}", f"{one.share:.1%}" if one else "", lab_words.error_text(part, 3),
              lab_words.error_text(one, 3) if one else "") for one, part in lab_words.paired(plain, refitted)]
-    heads = ("Band", f"From, to [{unit}]", "", "Share", "filed", "NRMSE", "filed")
+    heads = ("Band", f"From, to [{unit}]", "", "Share", "unchanged", "NRMSE", "unchanged")
     return Section(title, [Table(heads, rows, (0, 2))])
 
 

@@ -343,7 +343,7 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
                      f"run the residual is {_left_over(found, found.excess)}.")
         if found.contradicted_by:
             lines.append(f"It appears only in {enumerated(found.contradicted_by, 'and')}; the model explains the other "
-                         "signals down to their noise. Check that sensor: its place, its sign, its filter.")
+                         "signals down to their noise. Check that sensor's position, sign and filter.")
         if any(one.p_value < FALSE_ALARM and one.effect.name not in found.verdict for one in found.candidates):
             lines.append(f"ridelog names no effect that gains less than {IMITATION:.0%} of what a full explanation "
                          "would: it may only imitate what is missing.")
@@ -669,7 +669,7 @@ def _same_road_steps(found: UnknownRoadDiagnosis) -> list[tuple[str, float]]:
 
 def cannot_tell(found: UnknownRoadDiagnosis) -> list[str]:
     """What these drives cannot show or identify, in sentences."""
-    lines = [f"Whether {one} and {other} are over one road: where they overlap, too little of their records is above "
+    lines = [f"Whether {one} and {other} are over one road: where they overlap, their records hardly exceed "
              "the noise." for one, other in found.doubtful]
     if found.absorbed_by_road:
         lines.append(f"{', '.join(found.absorbed_by_road)}: not tried; on a road that nobody measured, another road "

@@ -243,7 +243,7 @@ def next_words(one: LabNextDrive) -> str:
     shown = _most(one.gains)
     more = len(one.gains) - len(shown)
     gains = ", ".join(f"{name} {number(each)}" for name, each in shown.items())
-    count = f"names {one.more_named:.1f} more effects" if one.more_named >= 0.05 else "names no more effects"
+    count = f"{one.more_named:.1f} more effects named" if one.more_named >= 0.05 else "no more effects named"
     return (f"{do_words(one.option)}: {count} (expected). Standard deviations gained: {gains}"
             f"{f' and {more} more' if more else ''}.")
 

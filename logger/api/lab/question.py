@@ -37,7 +37,7 @@ class LabQuestion(question.LongQuestion):
 
 @dataclass(frozen=True)
 class CompareQuestion(LabQuestion):
-    """Compare a vehicle's model with measurements: the error, where it sits, and what kind of thing is missing.
+    """Compare a vehicle's model with measurements: the error, where it is largest, and what kind of physics is missing.
 
     Each RUN is a folder with drive.csv (t_s,accel_z_mps2,speed_mps,distance_m) and the profile.csv it was driven on,
     or, of a rig, drive.csv (t_s,accel_z_mps2) and the excitation.csv (t_s,elevation_m[,elevation_rear_m]) that drove
@@ -213,7 +213,7 @@ class PlanQuestion(LabQuestion):
         "r.m.s. of the sensor's noise [m/s2] (default: that of the runs; without runs 0.05)", question.NOISE,
         "MPS2")] = None
     step_mps2: Annotated[float, question.Option(
-        "step to which the planned sensor rounds [m/s2]", question.ADDED, "MPS2")] = 0.0
+        "quantisation step of the planned sensor [m/s2]", question.ADDED, "MPS2")] = 0.0
     candidates: shared_fields.Candidates = None
     effect_files: shared_fields.EffectFiles = ()
 

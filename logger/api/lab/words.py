@@ -67,9 +67,9 @@ _ALIKE = 0.15
 _MOST = 4
 _REMOVED_WORDS = {
     OFFSET: "a constant offset of {size:.2g} m/s2",
-    RAMP: "a ramp of {size:.2g} m/s2 in all",
+    RAMP: "a ramp of {size:.2g} m/s2 in total",
     STEP: "a step of {size:.2g} m/s2 at {time:.3g} s",
-    EXPONENTIAL: "exponential, {time:.2g} s, {size:.2g} m/s2",
+    EXPONENTIAL: "an exponential of {size:.2g} m/s2 with a time constant of {time:.2g} s",
     WANDER: "a random walk, {size:.2g} m/s2 r.m.s.",
 }
 HEADS = ("What", "Share of the residual's power", "")
@@ -87,7 +87,7 @@ def removed_words(found: Removed, band: ComparedBand | None) -> list[str]:
                      "correct it.")
     if found.drifting_sensors:
         lines.append(f"The sensor drifts ({drift_words(found)}). The motion does not cause the drift, which makes up "
-                     f"{percent(found.drift_share)} of the residual's power before any fit. The lab judges nothing "
+                     f"{percent(found.drift_share)} of the residual's power before any fit. The lab ignores all "
                      f"below {LOWEST_HZ:g} Hz; without the drift, the refitted model's NRMSE is {found.error:.3f}.")
     return lines
 

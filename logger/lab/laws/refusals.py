@@ -69,14 +69,14 @@ def refusal(draft: Draft, model: Baseline, without: Baseline) -> Refusal | None:
     errors = standard_errors(model.linear)
     one = next(each for each in errors.effects if each.effect.name == draft.name)
     if does_nothing(one, errors.numbers):
-        return Refusal(draft.title, f"its strength is within {SURE_SIGMA:g} standard errors of no effect")
+        return Refusal(draft.title, f"its strength is within {SURE_SIGMA:g} standard errors of zero")
     if why := _beyond(model.posterior, one):
         return Refusal(draft.title, why)
     if draft.family.is_straight(draft, one, SURE_SIGMA):
         return Refusal(draft.title, f"it is a straight line within {SURE_SIGMA:g} standard errors, which a parameter "
                                     "of the model already describes")
     if model.hold_out.is_worse_than(without.hold_out):
-        return Refusal(draft.title, "the model with it predicts worse what no fit saw")
+        return Refusal(draft.title, "it raises the error on held-out stretches")
     return None
 
 

@@ -261,7 +261,7 @@ def _refine(signals: list[Array], rate_hz: float, began_s: float, at: Array, coh
 ALL_ALIKE: Sequence[str] = ("",)
 EACH = "_each"
 """End of the names of laws with a phase in each run."""
-BEGINS = ", beginning elsewhere in each run"
+BEGINS = ", with its own phase in each run"
 _MOST = 8
 
 

@@ -28,14 +28,14 @@ LEAST_SHARE = 0.02
 LEAST_GROWTH = 1.3
 """A residual that changes by a smaller factor is as large everywhere. A judgement."""
 BANDS = {
-    "below body bounce": "below the body's bounce",
-    "body bounce": "around the body's bounce",
+    "below body bounce": "below body bounce",
+    "body bounce": "around body bounce",
     "between": "between body bounce and wheel hop",
-    "wheel hop": "around the wheels' hop",
-    "above wheel hop": "above the wheels' hop",
-    "far above wheel hop": "far above the wheels' hop",
-    "above body bounce": "above the body's bounce",
-    "far above body bounce": "far above the body's bounce",
+    "wheel hop": "around wheel hop",
+    "above wheel hop": "above wheel hop",
+    "far above wheel hop": "far above wheel hop",
+    "above body bounce": "above body bounce",
+    "far above body bounce": "far above body bounce",
     "all": "in the whole band",
     "beyond the recorder's filter": "beyond the recorder's filter",
 }

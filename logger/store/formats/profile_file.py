@@ -369,7 +369,7 @@ def read_places(path: Path | str) -> tuple[Array, Array, Array]:
     wanted = (COLUMNS[0], *PLACE)
     _, values, file = parse_columns(
         read_bounded(path, MAX_BYTES), str(path), lambda names: wanted if set(wanted) <= set(names) else None,
-        f"a header with {','.join(wanted)}: a drive is found on the line by its places", gaps=True)
+        f"a header with {','.join(wanted)}, as positions locate a drive on the line", gaps=True)
     known = np.isfinite(values)
     placed = known[:, 1:].all(axis=1)
     if (half := known[:, 1:].any(axis=1) & ~placed).any():
@@ -416,7 +416,7 @@ def _even_spacing(distance: Array, steps: Array, file: str) -> float:
     if (np.abs(off_grid) <= _rounding_m(spacing_m)).all():
         return spacing_m
     usual_m = float(np.median(steps))
-    hint = f"(--resample {usual_m:.4g} would lay straight lines between the samples)"
+    hint = f"(--resample {usual_m:.4g} interpolates between the samples)"
     if steps.max() > WIDEST_BRIDGED_M:
         hint = "(cut the profile there)"
     odd = np.abs(steps - usual_m) > 2 * _rounding_m(usual_m)

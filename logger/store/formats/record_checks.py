@@ -165,11 +165,11 @@ def with_marks(record: EvenRecord, usable: Array | None) -> EvenRecord:
     if usable is None:
         return record
     share, clipped = float((usable == NO_READING).mean()), int(np.count_nonzero(usable == CLIPPED))
-    doubts = [Doubt("holes", f"{share:.1%} of the samples are no readings, as the column usable says, and lie on "
-                    "straight lines: the true values are higher", {"share": share})]
+    doubts = [Doubt("holes", f"{share:.1%} of the samples are interpolated, as the column usable marks them as "
+                    "missing: the true values are higher", {"share": share})]
     doubts = doubts if share > _HOLES else []
     doubts += [Doubt("range_end", f"{clipped} samples are at an end of the sensor's range, as the column usable "
-                     "says: the true values are higher; record with a larger range", {"samples": clipped})
+                     "shows: the true values are higher; record with a larger range", {"samples": clipped})
                ] if clipped else []
     return replace(record, doubts=(*record.doubts, *doubts))
 
@@ -188,7 +188,7 @@ def even_columns(columns: Mapping[str, Array], file: str, asked: RecordRules) ->
     return found
 
 
-_MEND = " (--resample lays samples on an even grid)"
+_MEND = " (--resample makes the rate even)"
 
 
 def _resampled(t_s: Array, samples: Array, names: Mapping[str, Array], others: Mapping[str, Array],
@@ -213,8 +213,8 @@ def _resampled(t_s: Array, samples: Array, names: Mapping[str, Array], others: M
     own_hz = mean_rate_hz(taken_s)
     holes = steps[steps > HOLE_STEPS / own_hz].sum() / (taken_s[-1] - taken_s[0])
     if holes > _HOLES:
-        doubts = [*doubts, Doubt("holes", f"{holes:.1%} of the time lies in holes, across which straight lines were "
-                                 "laid: the true values are higher", {"share": float(holes)})]
+        doubts = [*doubts, Doubt("holes", f"{holes:.1%} of the time is gaps, bridged by interpolation: the true "
+                                 "values are higher", {"share": float(holes)})]
     wanted_hz = rate_hz if rate_hz != OWN_RATE else max(LEAST_RATE_HZ, own_hz)
     laid = on_even_grid(taken_s, taken, own_hz, wanted_hz)
     grid_s = taken_s[0] + np.arange(len(laid)) / wanted_hz
@@ -273,8 +273,8 @@ def still_doubts(names: Iterable[str], t_s: Array, samples: Array, held: Bools) 
     doubts = []
     begin_s = repeated_samples.still_until_s(t_s, samples) - t_s[0]
     if begin_s > LONGEST_HOLE_S and not held[1] and np.ptp(samples, axis=0).any():
-        doubts.append(Doubt("held", f"the sensor is frozen on all axes for the first {begin_s:.3g} s: a parked car, "
-                            "or it was not read; it lowers the values: cut it off",
+        doubts.append(Doubt("held", f"the sensor is frozen on all axes for the first {begin_s:.3g} s, in a parked "
+                            "car or because it was not read; this lowers the values: cut it off",
                             {"seconds": float(begin_s), "places": 1}))
     for name, values in zip(names, samples.T, strict=True):
         if np.ptp(values) == 0.0:

@@ -414,7 +414,7 @@ def _by_start(words: str, masses: list[tuple[int, float]], rates: list[tuple[int
 
 def _scatter(words: str, name: str, draws: Sequence[tuple[Fit, ...]]) -> list[tuple[Cell, ...]]:
     rows: list[tuple[Cell, ...]] = []
-    for way, found in zip(("white noise (the source's way)", "most likely noise model (ours)"), zip(*draws,
+    for way, found in zip(("white noise (the source's method)", "most likely noise model (ours)"), zip(*draws,
                                                                                                     strict=True),
                           strict=True):
         errors = np.array([error_percent(one, name) for one in found])
@@ -499,20 +499,20 @@ def _f4_21(effort: Workload) -> Result:
     numbers = np.stack([their_mass, mass, expected, 100 * (mass / TRUTH[MASS] - 1)], axis=1).tolist()
     rows = tuple((window, "very close to 875", *found) for window, found in zip(windows, numbers, strict=True))
     table = Table("Mass, by the length of the window", (
-        Column("window [m]", ".0f"), Column("printed [kg]"), Column("white noise, the source's way [kg]", ".1f"),
+        Column("window [m]", ".0f"), Column("printed [kg]"), Column("white noise, the source's method [kg]", ".1f"),
         Column("ours [kg]", ".1f"), Column("standard error [kg]", ".1f"), Column("error of ours [%]", "+.2f")), rows)
     inside = int((np.abs(mass - TRUTH[MASS]) < 2 * expected).sum())
     verdict = ("As the source finds, the window hardly matters once both axles are over the bump (some 8 m): the bump "
                f"shows the mass, the road behind it almost nothing. In {inside} of {len(windows)} windows the truth "
                "lies within two standard errors; all share one road, so their errors are alike. In 5 m, where only "
-               "the front axle crosses the bump, the source's way is a little less accurate.")
+               "the front axle crosses the bump, the source's method is a little less accurate.")
     picture = Picture(Curves("Mass and its standard error", "window [m]", "mass [kg]", (
         Line("ours", np.array(windows), mass, expected),
-        Line("white noise, the source's way", np.array(windows), their_mass, dots=True)), (TRUTH[MASS], "875 kg")),
+        Line("white noise, the source's method", np.array(windows), their_mass, dots=True)), (TRUTH[MASS], "875 kg")),
         "the mass from windows of 5 to 100 m, very close to 875 kg for each")
     values = tuple(Value(f"mass, the worst window from {least:g} m, {way} [kg]", TRUTH[MASS], _worst(
         found, np.array(windows) >= least), very_close * TRUTH[MASS], Word.NOT_REPRODUCIBLE)
-                   for way, found, least in (("the source's way", their_mass, 10.0), ("ours", mass, 0.0)))
+                   for way, found, least in (("the source's method", their_mass, 10.0), ("ours", mass, 0.0)))
     return Result((table,), verdict, (picture,), values)
 
 
@@ -758,7 +758,7 @@ def _f4_31(effort: Workload) -> Result:
     values: tuple[Check, ...] = (*about("Fig 4.31", [Value("mass at the true height, 38.1 mm [kg]", TRUTH[MASS], exact,
                                         0.01 * TRUTH[MASS])]),
               *about("Fig 4.31", [
-                  Statement("correlation of mass and assumed height, the source's way", "linearly proportional",
+                  Statement("correlation of mass and assumed height, the source's method", "linearly proportional",
                             float(np.corrcoef(heights, white)[0, 1]), 0.99),
                   Statement("error of the mass with the height estimated, over its standard error",
                             "the mass cannot be predicted without the "

@@ -94,13 +94,13 @@ def _t6_1(effort: Workload) -> Result:
         (float(number), masses[0], errors[0], masses[1], errors[1])
         for number, (masses, errors) in enumerate(zip(PRINTED_KG, PRINTED_PERCENT, strict=True), start=1)))
     one_by_one = Table("Simulated: assumed bump 150 mm by 2.60 m at 16.1 km/h; the true one differs by row", (
-        Column("truth relative to the assumption"), Column("the source's way: error of the mass [%]", "+.2f"),
+        Column("truth relative to the assumption"), Column("the source's method: error of the mass [%]", "+.2f"),
         Column("ours, bump and speed estimated [%]", "+.2f"), Column("its standard error [%]", ".2f")), tuple(
         (case[0], *errors) for case, errors in zip(CASES_T6_1, cases, strict=True)))
     theirs, ours, expected = draws.T
     rows: tuple[tuple[Cell, ...], ...] = (
         ("printed, 8 drives", _rms_t6_1(np.array(PRINTED_PERCENT)), float(np.max(PRINTED_PERCENT)), None),
-        (f"the source's way, {drives} simulated drives", _rms_t6_1(theirs), float(np.abs(theirs).max()), None),
+        (f"the source's method, {drives} simulated drives", _rms_t6_1(theirs), float(np.abs(theirs).max()), None),
         ("ours, the same drives",
          _rms_t6_1(ours), float(np.abs(ours).max()),
          float(100 * (np.abs(ours) < 2 * expected).mean())))
@@ -122,7 +122,7 @@ def _t6_1(effort: Workload) -> Result:
                   "changes in speed are a possible "
                   "source of error", rms / per_percent, 0.0, 100 * speedometer, Word.NOT_REPRODUCIBLE)])),
         *about(tuple(by_trial), [
-            Statement("error with width or speed 5 % off, ours over the source's way",
+            Statement("error with width or speed 5 % off, ours over the source's method",
                       "discrepancies of width and speed are "
                       "possible sources of error", _largest(cases, 1) / _largest(cases, 0), 0.0, 0.2,
                       Word.NOT_REPRODUCIBLE)]),
@@ -130,7 +130,7 @@ def _t6_1(effort: Workload) -> Result:
             Value(f"error of the printed mass, bump {bump} [%]", pair[trial],
                   100 * abs(PRINTED_KG[bump - 1][trial] / TRUTH[MASS] - 1), 0.01, of_print=True)
             for bump, pair in enumerate(PRINTED_PERCENT, start=1)])))
-    errors = {"printed": np.ravel(PRINTED_PERCENT), "the source's way": theirs, "ours": ours}
+    errors = {"printed": np.ravel(PRINTED_PERCENT), "the source's method": theirs, "ours": ours}
     scatter = Picture(Curves("Errors of the mass, sorted by size", "share of the drives [%]", "error of the mass [%]",
                              tuple(Line(name, 100 * (np.arange(len(found)) + 0.5) / len(found), np.sort(np.abs(found)))
                                    for name, found in errors.items())),
@@ -169,7 +169,7 @@ def _rms_t6_1(values: np.ndarray) -> float:
 T6_1 = Study("table_6_1", "Mass from speed bumps whose size and speed differ a little from the assumed ones",
              "Table 6.1 (and 6.2), section 6.2.1",
              "The source measured, and its records were never published. Simulated: the car of Table 4.2, a PS-2119 "
-             "with steps of 0.01 g, 20 Hz low-pass and a start at 875 kg for the source's way, as in 6.2.1.", _t6_1,
+             "with steps of 0.01 g, 20 Hz low-pass and a start at 875 kg for the source's method, as in 6.2.1.", _t6_1,
              items=alike(("Table 6.1", "Table 6.2"), Word.NOT_REPRODUCIBLE, "The records were never published; errors "
                          "of that kind follow from a bump and a speed that are a few per cent off."))
 
@@ -192,7 +192,7 @@ def _t6_3(effort: Workload) -> Result:
         Column("trial 2, mass [kg]", ".3f"), Column("error [%]", ".2f")), PRINTED_T6_3)
     table = Table(f"Simulated, 48.3 km/h; figures are r.m.s. over {roads} roads", (
         Column("true step [mm]", ".1f"), Column("IRI [m/km]", ".0f"), Column("road assumed flat: our answer"),
-        Column("step assumed a third too high, the source's way: error of mass [%]", ".1f"),
+        Column("step assumed a third too high, the source's method: error of mass [%]", ".1f"),
         Column("ours, height estimated: error of mass [%]", ".1f"), Column("its standard error [%]", ".1f"),
         Column("mass known: error of height [mm]", ".1f"), Column("its standard error [mm]", ".1f")), rows)
     verdict = ("The source assumed a flat road. A flat input moves no car, whatever its mass: ridelog refuses to answer"
@@ -211,7 +211,7 @@ def _t6_3(effort: Workload) -> Result:
     values: tuple[Check, ...] = (*about(items, [
         Statement("drives in which a flat input shows nothing of the mass [%]", "an input assumed flat gives "
                   "inconsistent masses", 100 * refused, 100.0, word=Word.NOT_REPRODUCIBLE),
-        Statement(f"the source's way, a step of {1000 * rough_m:.1f} mm on IRI 5 assumed a third too high: r.m.s. "
+        Statement(f"the source's method, a step of {1000 * rough_m:.1f} mm on IRI 5 assumed a third too high: r.m.s. "
                   "error [%]",
                   f"a weak signal; errors of {least:.0f} to {most:.0f} %", theirs, least, most + chance * theirs,
                   Word.NOT_REPRODUCIBLE),

@@ -14,12 +14,12 @@ from logger.vehicle.structure import Structure, hung
 
 
 class Occupant(BodyEffect):
-    title = "a mass that swings on the body, as passengers on their seats"
+    title = "a mass on a spring on the body, such as passengers on their seats"
     parameters = (
         Parameter("mass_kg", 70.0, 0.0, 1000.0, 0.0, Scale.LINEAR, (60.0,),
-                  "that swings; in a half car on one side"),
-        Parameter("frequency_hz", 4.0, 0.8, 15.0, None, Scale.LOG, (2.5, 4.0, 6.0), "of that mass on what holds it"),
-        Parameter("damping_ratio", 0.3, 0.003, 1.5, None, Scale.LOG, (0.25,), "of what it swings on"),
+                  "on the spring; in a half car on one side"),
+        Parameter("frequency_hz", 4.0, 0.8, 15.0, None, Scale.LOG, (2.5, 4.0, 6.0), "of that mass on its spring"),
+        Parameter("damping_ratio", 0.3, 0.003, 1.5, None, Scale.LOG, (0.25,), "of that spring"),
     )
     source = "M. J. Griffin, Handbook of Human Vibration (1990), chapter 9: seated people resonate at 4 to 6 Hz"
     signature = "at 3 to 6 Hz the body moves less than the model says, and a little more below"

@@ -81,4 +81,4 @@ def test_sentences_say_that_each_run_begins_elsewhere() -> None:
     found = SimpleNamespace(values={"turn_radius_m": 0.31, "cos_run_1_kg_m": 0.3, "sin_run_1_kg_m": 0.4,
                                     "cos_run_2_kg_m": -0.5, "sin_run_2_kg_m": 0.0})
     said = WHEEL_TURNS.words(draft, found, lambda name, *unit: name)  # type: ignore[arg-type]
-    assert said.endswith("out of balance (mean of the runs) by 0.5 kg m, beginning elsewhere in each run")
+    assert said.endswith("out of balance (mean of the runs) by 0.5 kg m, with its own phase in each run")

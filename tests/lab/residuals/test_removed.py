@@ -39,7 +39,7 @@ def test_a_drift_is_named_with_its_share_and_nothing_else_is_missing() -> None:
     assert removed.drift_share == pytest.approx(drift / (drift + NOISE_MPS2**2), rel=0.03)
     assert removed.error == pytest.approx(clean.plain.error * clean_size(clean, found), rel=0.03)
     said = " ".join(headline(found))
-    assert "The sensor drifts (exponential, " in said and "The motion does not cause the drift" in said
+    assert "The sensor drifts (an exponential of " in said and "The motion does not cause the drift" in said
     assert evidence(found) == ["No test finds more than noise in the residual."] and not found.missing
     assert conclusion(found).startswith("The model lacks nothing beside")
     shown = comparison_json(found)

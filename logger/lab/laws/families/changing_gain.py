@@ -11,7 +11,7 @@ _METHOD = """def record(self, p, recording):
 
 
 class ChangingGain(Family):
-    title = "a gain that changes as a run goes on"
+    title = "a gain that changes during a run"
     related_effects = ("sensor_gain",)
     kind = "RecordEffect"
     source = "data sheets of accelerometers give a change of sensitivity with temperature"

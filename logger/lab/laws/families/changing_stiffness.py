@@ -23,7 +23,7 @@ _OF = {"springs": ("travel_m", "BODY_AND_WHEEL", "the body bounces"),
 
 
 class ChangingStiffness(Family):
-    title = "a stiffness that changes as a run goes on"
+    title = "a stiffness that changes during a run"
     source = "a tire's stiffness by its pressure: J. Y. Wong, Theory of Ground Vehicles (2008), chapter 1"
     shown_by = "drive one rough road for half an hour from cold, recorded as one run"
 
@@ -36,7 +36,7 @@ class ChangingStiffness(Family):
             ("tires", [one.tire_stiffness_n_per_m for one in axles]))]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
-        return (f"{draft.variant} whose stiffness changes by {say('changed_n_per_m', 0.001, 'N/mm')} as a run goes on, "
+        return (f"{draft.variant} whose stiffness changes by {say('changed_n_per_m', 0.001, 'N/mm')} during a run, "
                 f"within about {say('time_s')}")
 
 
@@ -50,8 +50,8 @@ def _draft(of: str, stiffness_n_per_m: float, lasts_s: float) -> Draft:
         Parameter("time_s", times[1], rounded(0.01 * lasts_s), rounded(10 * lasts_s), None, Scale.LOG, times,
                   "time constant of the change"))
     return FAMILY.draft(parameters, _METHOD.format(between=between), _FUNCTIONS.format(motion=motion), variant=of,
-                        title=f"{of} whose stiffness changes as a run goes on",
-                        signature=f"{what} faster, or slower, as a run goes on")
+                        title=f"{of} whose stiffness changes during a run",
+                        signature=f"{what} faster, or slower, later in a run")
 
 
 FAMILY = ChangingStiffness()

@@ -38,7 +38,7 @@ _DAMPERS = "dampers whose damping changes with the driving speed"
 
 
 class ChangingWithSpeed(Family):
-    title = "a damping or a stiffness that changes with the driving speed"
+    title = "damping or stiffness that changes with driving speed"
     signature = "runs at different speeds need different parameters of one car"
     shown_by = "drive one road slowly and fast"
 

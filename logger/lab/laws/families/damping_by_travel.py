@@ -7,7 +7,7 @@ from logger.vehicle.effect import Chosen, Parameter, Scale
 
 
 class DampingByTravel(Family):
-    title = "a damping that depends on the travel of the suspensions"
+    title = "damping that depends on suspension travel"
     related_effects = ("damper_blow_off", "damper_asymmetry", "progressive_spring")
     source = "J. C. Dixon, The Shock Absorber Handbook (2007), chapter 3: position-dependent damping"
     signature = "the damping is larger far from rest than near it"

@@ -20,9 +20,9 @@ _METHOD = """def laws(self, p, laws):
 
 
 class FadingDamping(Family):
-    title = "a damping that changes as a run goes on"
+    title = "damping that changes during a run"
     source = "J. C. Dixon, The Shock Absorber Handbook, 2007, section 6.7"
-    signature = "the body and the wheels ring longer, or more briefly, as a run goes on"
+    signature = "the body and the wheels ring longer, or more briefly, later in a run"
     shown_by = "drive one rough road for half an hour from cold, recorded as one run"
 
     def drafts(self, context: LawContext) -> list[Draft]:
@@ -35,7 +35,7 @@ class FadingDamping(Family):
         return [self.draft((lost, time), _METHOD, _FUNCTIONS, variant="settling")]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
-        return f"a damping that loses a share of {say('lost_ratio')} as a run goes on, within about {say('time_s')}"
+        return f"a damping that loses a share of {say('lost_ratio')} during a run, within about {say('time_s')}"
 
 
 FAMILY = FadingDamping()

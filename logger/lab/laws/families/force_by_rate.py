@@ -9,7 +9,7 @@ from logger.lab.laws.curves import RATE, CurveFamily
 
 
 class ForceByRate(CurveFamily):
-    title = "a force by the rate of the suspensions"
+    title = "a force that depends on suspension rate"
     related_effects = ("damper_blow_off", "damper_asymmetry", "dry_friction")
     shown_by = "drive the same road slowly and fast, or a smooth and a rough one"
     motion = RATE

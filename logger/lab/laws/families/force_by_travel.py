@@ -9,7 +9,7 @@ from logger.lab.laws.curves import TRAVEL, CurveFamily
 
 
 class ForceByTravel(CurveFamily):
-    title = "a force by the travel of the suspensions"
+    title = "a force that depends on suspension travel"
     related_effects = ("progressive_spring", "bump_stop")
     shown_by = "drive a rough road, or over obstacles, so that the suspension travels far"
     motion = TRAVEL

@@ -31,7 +31,7 @@ def structure(self, p, structure):
 
 
 class InertiaBehindSpring(Family):
-    title = "inertia in the suspensions, maybe behind a spring"
+    title = "inertia in the suspensions, perhaps in series with a spring"
     related_effects = ("top_mount_compliance", "hysteresis")
     source = ("M. C. Smith, IEEE Trans. Automatic Control 47 (2002) 1648: the inerter; W. C. Flower, SAE 850975 "
               "(1985): hydraulic mounts")
@@ -57,7 +57,7 @@ class InertiaBehindSpring(Family):
         return [self.draft((inertance,), _RIGID, kind="BodyEffect", variant="rigid",
                            title="inertia that moves with the suspensions' travel",
                            signature="the wheels hop at a lower frequency, and the body feels it"),
-                self.draft(sprung, handed_on(states=2), _FUNCTIONS, title="inertia behind a spring in the suspensions",
+                self.draft(sprung, handed_on(states=2), _FUNCTIONS, title="inertia in series with a spring",
                            variant="sprung", at="loop")]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:

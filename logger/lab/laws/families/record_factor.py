@@ -27,7 +27,7 @@ _HZ = (2.0, 5.0, 10.0, 18.0, 28.0)
 
 
 class RecordFactor(Family):
-    title = "a correction between body and record"
+    title = "a linear filter between body and record"
     related_effects = ("sensor_bandwidth", "sensor_mount_resonance", "body_bending", "sensor_gain")
     kind = "SensorEffect"
     source = "a rational function of low order (L. Ljung, System Identification, 1999, section 4.2)"

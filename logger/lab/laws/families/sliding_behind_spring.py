@@ -29,7 +29,7 @@ def rates(p, seen):
 
 
 class SlidingBehindSpring(Family):
-    title = "sliding behind a spring, in a part on a bench"
+    title = "friction in series with a spring, in a part on a bench"
     related_effects = ("hysteresis", "top_mount_compliance", "dry_friction")
     source = ("F. H. Norton, The Creep of Steel at High Temperatures (1929); P. Perzyna, Advances in Applied Mechanics "
               "9 (1966) 243")

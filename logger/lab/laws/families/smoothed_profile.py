@@ -38,7 +38,7 @@ squares, so that no slope leads far."""
 
 
 class SmoothedProfile(Family):
-    title = "a profile that lacks short waves"
+    title = "a profile that lacks short wavelengths"
     related_effects = ("tire_enveloping", "sensor_mount_resonance", "sensor_bandwidth")
     kind = "RoadEffect"
     source = "profilers average over a base length (ASTM E950; EN 13036-6)"

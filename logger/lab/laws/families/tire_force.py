@@ -10,7 +10,7 @@ from logger.lab.laws.curves import DEFLECTION, CurveFamily
 
 
 class TireForce(CurveFamily):
-    title = "a force by the deflection of the tires"
+    title = "a force that depends on tire deflection"
     related_effects = ("bump_stop", "progressive_spring", "wheel_lift")
     shown_by = "drive a rough road, or over obstacles, fast, so that the tires deflect far"
     motion = DEFLECTION
