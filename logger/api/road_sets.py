@@ -251,7 +251,7 @@ def compared_table(parts: list[Compared], window_m: float) -> Table:
         if others:
             factor = factor_to(*(np.concatenate([getattr(other, name) for other in others])
                                  for name in ("iri_m_per_km", "reference_m_per_km")))
-            rows.append(_row(one.road, f"{one.what}, times {factor:.3g} by the other roads", agreement(
+            rows.append(_row(one.road, f"{one.what}, scaled by {factor:.3g} (from the other roads)", agreement(
                 factor * one.iri_m_per_km, factor * one.iri_std_m_per_km, one.reference_m_per_km)))
     return Table(f"Windows of {window_m:g} m", COLUMNS, tuple(rows))
 
