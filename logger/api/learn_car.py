@@ -272,9 +272,9 @@ def _uneven_dampers(car: LearnedCar) -> Iterator[str]:
         yield ("The harmonics of wheel hop are stronger than even dampers that act in one direction only would cause. "
                "A measured street and ridelog diagnose may show what causes them.")
     elif uneven > _SIGMA * std:
-        yield ("The dampers are asymmetric: bump and rebound damping differ by a factor of "
-               f"{(1 + uneven) / (1 - uneven):.2g} ± {2 * std / (1 - uneven) ** 2:.1g}. A measured street "
-               "and ridelog diagnose show which is larger (damper_asymmetry).")
+        yield (f"The dampers are asymmetric, by a factor of {(1 + uneven) / (1 - uneven):.2g} ± "
+               f"{2 * std / (1 - uneven) ** 2:.1g} between bump and rebound. A measured street and ridelog diagnose "
+               "show which is harder (damper_asymmetry).")
 
 
 def _not_linear(much: LearnedCar, little: LearnedCar) -> str:

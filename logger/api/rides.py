@@ -297,7 +297,7 @@ def _conclusions(result: RideComfort) -> list[str]:
         lines.append(_which_to_use(result))
     health = _health(result)
     if health is None:
-        return [*lines, f"Health: {result.weighting.name.capitalize()} is not a weighting for health."]
+        return [*lines, f"Health: {result.weighting.name.capitalize()} has no health guidance in ISO 2631-1."]
     n2, n4, dose = (health["caution_zone"][name] for name in ("n2", "n4", "vdv"))
     return [
         *lines,

@@ -94,7 +94,7 @@ def _refuse_hidden(program: Path) -> None:
     installation stays where it was) in a place that the units hide."""
     for place in (program, Path(sys.executable).resolve(), Path(logger.__file__).resolve()):
         if hidden_from_services(place):
-            raise BadInput(f"{place}: expected the program, its Python and its code in a place that a service can see, "
+            raise BadInput(f"{place}: expected the program, its Python and its code where a service can read them, "
                            f"such as {PROGRAM.parent.parent}")
 
 

@@ -50,7 +50,7 @@ def spread(t_s: Array, ends: npt.NDArray[np.int64]) -> Array:
     """
     ends = ends[1:-1]  # those that the record cuts off
     if len(ends) < 3:
-        raise ValueError(f"found {len(ends)} bursts of samples and no rate")
+        raise ValueError(f"found {len(ends)} bursts of samples, too few for a rate")
     slope_s, start_s = np.polyfit(ends, t_s[ends], 1)
     late_s = np.abs(t_s[ends] - start_s - slope_s * ends).max()
     if slope_s <= 0 or late_s > _LATE * np.median(np.diff(t_s[ends])):

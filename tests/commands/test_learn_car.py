@@ -136,7 +136,7 @@ def test_uneven_dampers_are_named_with_their_ratio(learned: tuple[dict[str, Any]
     found = called("learn-car", *written(tmp_path, drives, FINE_SENSOR), "--wheelbase", 2.66, "--json")
     said, = json.loads(found.stdout)["effects_missing"]
     ratio, error = map(float, re.findall(r"[\d.]+", said)[:2])
-    assert "Dampers are uneven" in said and abs(ratio - 2.0) < 3 * error < 1.0
+    assert "dampers are asymmetric" in said and abs(ratio - 2.0) < 3 * error < 1.0
     assert learned[0]["effects_missing"] == []
 
 

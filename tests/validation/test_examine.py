@@ -153,10 +153,10 @@ def test_seeds_of_a_release_are_asked_for_by_name() -> None:
 
 
 def test_the_report_says_which_seeds_were_asked() -> None:
-    assert "development seeds 1 to 13: the lab may have been tuned to them" in markdown(RECORDS, 11, "m.svg")
+    assert "development seeds, 1 to 13, may have shaped the lab" in markdown(RECORDS, 11, "m.svg")
     kept_back = [record | {"seed": RELEASE_SEEDS[0] + record["seed"]} for record in RECORDS]
     text = markdown(kept_back, 11, "m.svg")
-    assert "release seeds 7001 to 7013: no run of the lab's development has used them" in text
+    assert "release seeds, 7001 to 7013, were never used while the lab was developed" in text
     assert "examine --release" in text
 
 

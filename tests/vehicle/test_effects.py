@@ -172,7 +172,7 @@ def test_an_effect_of_suspensions_may_sit_in_those_of_one_axle_alone(name: str) 
 
 
 def test_a_car_of_one_axle_has_no_other() -> None:
-    with pytest.raises(BadInput, match="dry_friction: expected axle 0, as a quarter car has one alone"):
+    with pytest.raises(BadInput, match="dry_friction: expected axle 0, as a quarter car has only one"):
         check_on(QUARTER, usual(EFFECTS["dry_friction"], axle=2.0), two_tracks=False)
 
 

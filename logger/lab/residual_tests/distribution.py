@@ -8,12 +8,12 @@ from logger.dsp.whole_record import HALF_WIDTH_HZ
 from logger.identification.noise_models import LAGS, autocorrelation, autocorrelations, rms
 from logger.lab.likelihood.whittle import BLOCK_S
 from logger.lab.residual_tests.tests import (
-    BANDS,
     SIGNIFICANCE,
     ResidualEvidence,
     ResidualTest,
     ResidualTestResult,
     ResidualTests,
+    in_band,
 )
 from logger.lab.residuals.statistics import mean_of_blocks, periodogram, strongest_line
 from logger.printable import percent
@@ -74,7 +74,7 @@ class FrequencyTest(ResidualTest):
         """Where the power lies."""
         part = found.figures["part"]
         error = f"; NRMSE there {part.error:.2f}" if np.isfinite(part.error) else ""
-        return (f"{percent(found.value)} of the residual's power lies {BANDS[part.name]} ({part.low:.2g} to "
+        return (f"{percent(found.value)} of the residual's power lies {in_band(part.name)} ({part.low:.2g} to "
                 f"{part.high:.2g} Hz), against {percent(found.figures['white_share'])} for white noise{error}.")
 
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from logger.lab.residual_tests.tests import (
-    BANDS,
     LEAST_SHARE,
     ResidualEvidence,
     ResidualTest,
     ResidualTestResult,
     ResidualTests,
+    in_band,
 )
 from logger.lab.residuals.breakdown import ModelResiduals
 from logger.lab.residuals.road_coherence import coherence_with_road
@@ -39,7 +39,7 @@ class CoherenceTest(ResidualTest):
     def sentence(self, found: ResidualTestResult) -> str:
         """How much, and where."""
         return (f"At least {percent(found.value)} of the residual is coherent with {found.figures['of']}, mostly "
-                f"{BANDS[found.figures['band']]}: not noise, and a linear effect could cause it.")
+                f"{in_band(found.figures['band'])}: not noise, and a linear effect could cause it.")
 
 
 class GainTest(ResidualTest):
@@ -60,8 +60,8 @@ class GainTest(ResidualTest):
 
     def sentence(self, found: ResidualTestResult) -> str:
         """The gain with its standard error."""
-        return (f"Where their shapes agree, the measurement is {found.value:.3g} ± {found.standard_error:.1g} times "
-                "the model.")
+        return (f"The part of the measurement that follows the model is {found.value:.3g} ± {found.standard_error:.1g} "
+                "times as large.")
 
 
 class ProportionTest(ResidualTest):
@@ -86,7 +86,7 @@ class ProportionTest(ResidualTest):
     def sentence(self, found: ResidualTestResult) -> str:
         """Both gains."""
         weak, strong = found.figures["weak"], found.figures["strong"]
-        return (f"The response is nonlinear: {BANDS[found.figures['band']]}, the measurement is {weak:.2f} times "
+        return (f"The response is nonlinear: {in_band(found.figures['band'])}, the measurement is {weak:.2f} times "
                 f"the model at small motion and {strong:.2f} times at large motion.")
 
 

@@ -41,7 +41,7 @@ class ForceByTest(ResidualTest):
         curve, less = found.figures["curve"], found.figures["bend"] < 0
         if self._by_rate:
             of, part, ends = "velocity", "dampers", _ends(curve, 1, "m/s")
-            both = f"like a damper that {'yields at speed' if less else 'stiffens with speed'}"
+            both = f"like a {'digressive' if less else 'progressive'} damper"
         else:
             of, part, ends = "travel", "springs", _ends(curve, 1000, "mm")
             both = f"like a spring that {'softens' if less else 'hardens'} far from its rest"

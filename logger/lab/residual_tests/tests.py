@@ -27,19 +27,12 @@ LEAST_SHARE = 0.02
 0.001."""
 LEAST_GROWTH = 1.3
 """A residual that changes by a smaller factor is as large everywhere. A judgement."""
-BANDS = {
-    "below body bounce": "below body bounce",
-    "body bounce": "around body bounce",
-    "between": "between body bounce and wheel hop",
-    "wheel hop": "around wheel hop",
-    "above wheel hop": "above wheel hop",
-    "far above wheel hop": "far above wheel hop",
-    "above body bounce": "above body bounce",
-    "far above body bounce": "far above body bounce",
-    "all": "in the whole band",
-    "beyond the recorder's filter": "beyond the recorder's filter",
-}
-"""Where a band of a breakdown lies, for a sentence."""
+_IN_BAND = {"body bounce": "around body bounce", "wheel hop": "around wheel hop", "all": "in the whole band"}
+
+
+def in_band(name: str) -> str:
+    """Where a band of a breakdown lies, for a sentence."""
+    return _IN_BAND.get(name, name)
 
 
 @dataclass(frozen=True)

@@ -132,8 +132,8 @@ class ModelResiduals:
             ("below body bounce", body_hz[0] / 1.35), ("body bounce", body_hz[-1] * 1.35)]
         if len(wheels_hz):
             between = np.sqrt(body_hz[-1] * wheels_hz[0])
-            own = [own[0], ("body bounce", min(own[1][1], between)), ("between", max(wheels_hz[0] / 1.3, between)),
-                   ("wheel hop", wheels_hz[-1] * 1.3)]
+            own = [own[0], ("body bounce", min(own[1][1], between)),
+                   ("between bounce and hop", max(wheels_hz[0] / 1.3, between)), ("wheel hop", wheels_hz[-1] * 1.3)]
         last, above = own[-1] if own else ("any vibration", 0.0)
         kept = max(PASS_OF_RATE * self.rate_hz, above)
         bands = (*own, (f"above {last}", np.sqrt(above * kept)), (f"far above {last}" if own else "all", kept),

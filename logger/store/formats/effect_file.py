@@ -68,7 +68,7 @@ def check_on(vehicle: Vehicle, one: Chosen, two_tracks: bool, timed: bool = Fals
     if obstacle is not None:
         raise BadInput(f"{one.effect.name}: {obstacle}")
     if vehicle.rear is None and one.where:
-        raise BadInput(f"{one.effect.name}: expected axle 0, as a {vehicle.model.replace('_', ' ')} has one alone")
+        raise BadInput(f"{one.effect.name}: expected axle 0, as a {vehicle.model.replace('_', ' ')} has only one")
     if one.file is not None:
         try_out(one.effect, one.p, vehicle)
     if isinstance(one.effect, VehicleEffect):

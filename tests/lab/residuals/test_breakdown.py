@@ -76,7 +76,7 @@ def test_parts_are_paired_by_band_or_by_ends_whatever_else_there_is() -> None:
     def part(low: float, high: float, name: str = "") -> Part:
         return Part(low, high, 0.1, 0.2, 0.3, 4, name)
 
-    before = [part(0, 1, "below body bounce"), part(1, 2, "body bounce"), part(2, 8, "between")]
+    before = [part(0, 1, "below body bounce"), part(1, 2, "body bounce"), part(2, 8, "between bounce and hop")]
     after = [part(0, 1.1, "below body bounce"), part(1.1, 2.1, "body bounce"), part(8, 12, "wheel hop")]
     assert paired(before, after) == [(before[0], after[0]), (before[1], after[1]), (None, after[2])]
     assert paired([part(0, 2), part(2, 4)], [part(2, 4), part(4, 6)]) == [(part(2, 4), part(2, 4)), (None, part(4, 6))]

@@ -82,18 +82,18 @@ def parts(records: Sequence[Record]) -> list[Part]:
         Part("Goals", [], _goals(records)),
         Part("By strength", [
             "Strength is the r.m.s. of what the effect changes in the noise-free record over the r.m.s. of the noise, "
-            "with all other numbers true; of several effects, that of the weakest. *Can be seen* leaves out the cases "
-            "of the section *What nobody could see*."], _by_strength(records)),
+            "with all other parameters true; of several effects, that of the weakest. *Can be seen* excludes the "
+            "cases under *What nobody could see*."], _by_strength(records)),
         Part("After adding", _adding(records)),
         Part("Time and memory", _cost(records)),
-        Part("Wrong verdicts", ["What these cases hid and what was said. An effect that is akin to one off the list is "
-                                "the nearest that the list has."], _wrong(records)),
-        Part("Wrong numbers", ["Verdicts that hold all effects, with an error or a number that is not as near as it "
-                               "should be."], _wrong_numbers(records)),
+        Part("Wrong verdicts", ["What these cases hid and what was said. For an effect off the list, the nearest "
+                                "listed one is marked akin."], _wrong(records)),
+        Part("Wrong numbers", ["Verdicts that name all effects, with an error or a number outside the goal."],
+             _wrong_numbers(records)),
         Part("What nobody could see", [
-            "In these cases the car's own numbers and the distance can do what the weakest effect does, each within "
-            "what it may be off by. By the examiner's simulator, less than 1 % of the error remains. They count in all "
-            "figures above as they came out. Distances that wander may hide more."], _unseen(records)),
+            "In these cases the car's own parameters and the distance, within their tolerances, reproduce the weakest "
+            "effect: in the examiner's simulator less than 1 % of the error remains. All figures above include them. "
+            "Distances that wander may hide more."], _unseen(records)),
     ]
 
 
@@ -103,13 +103,13 @@ def opening(records: Sequence[Record], asked: int) -> list[str]:
     counts = ", ".join(f"{count} with {_WORDS[kind]}" for kind, count in kinds.items())
     seeds = [record["seed"] for record in records]
     release = all(seed in RELEASE_SEEDS for seed in seeds)
-    which = "no run of the lab's development has used them" if release else "the lab may have been tuned to them"
-    lines = [f"{len(records)} random cases: {counts}. They have {'release' if release else 'development'} seeds "
-             f"{min(seeds)} to {max(seeds)}: {which}. A simulator made them that shares nothing with ridelog: other "
+    which = "were never used while the lab was developed" if release else "may have shaped the lab"
+    lines = [f"{len(records)} random cases: {counts}. Their {'release' if release else 'development'} seeds, "
+             f"{min(seeds)} to {max(seeds)}, {which}. A simulator made them that shares nothing with ridelog: other "
              "equations and another integrator, with roads, cars, speeds and noise of its own. The car's file is off "
              "by up to 4 %, distances by two centimetres. Where distances wander, they are integrals of a speed that "
              f"is wrong by {WRONG_MPS[0]:g} to {WRONG_MPS[1]:g} m/s for {WRONG_FOR_S[0]:g} to {WRONG_FOR_S[1]:g} s. "
-             "Each was put before `ridelog diagnose`, and what that named was added by `ridelog add-effect`. "
+             "Each was given to `ridelog diagnose`, and the effects that it named to `ridelog add-effect`. "
              f"Made by `{COMMAND}{' --release' if release else ''}`."]
     if len(records) < asked:
         lines.append(f"The examination is not over: {len(records)} of {asked} cases sat.")

@@ -38,7 +38,7 @@ class DamperBacklash(Family):
     title = "play in the mounts of the dampers"
     related_effects = ("top_mount_compliance",)
     source = "M. Nordin, P.-O. Gutman, Automatica 38 (2002) 1633: mechanical systems with backlash"
-    signature = "small motions are hardly damped; larger ones are, but late"
+    signature = "small motions are hardly damped, larger ones with a delay"
     shown_by = "drive a smooth road, so that the suspension moves by little more than the play"
 
     def drafts(self, context: LawContext) -> list[Draft]:
