@@ -209,7 +209,7 @@ def test_a_dry_run_refuses_what_the_real_one_would(
     places["python"].touch()
     places["program"].symlink_to(places["python"])
     monkeypatch.setattr(store, "_HIDDEN_FROM_SERVICES", (str(places[hidden].parent),))
-    with pytest.raises(BadInput, match="a place that a service can see"):
+    with pytest.raises(BadInput, match="where a service can read them"):
         main(arguments)
 
 
@@ -297,7 +297,7 @@ def test_without_a_folder_or_rights_nothing_is_begun(tmp_path: Path, monkeypatch
     with pytest.raises(BadInput, match="sudo"):
         main(["install"])
     monkeypatch.setattr("sys.executable", "/home/pi/venv/bin/python")
-    with pytest.raises(BadInput, match="a place that a service can see"):
+    with pytest.raises(BadInput, match="where a service can read them"):
         main(["install"])
 
 
