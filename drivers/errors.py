@@ -71,9 +71,13 @@ class DumpError(DriverError):
     """A recorded dump that cannot be read."""
 
 
-def shortened(text: str, longest: int = 80) -> str:
+SHOWN = 80
+"""Characters of a bad input that a line of complaint holds."""
+
+
+def shortened(text: str) -> str:
     """A piece of a bad input in quotes, fit for one line of complaint whatever it holds."""
-    return ascii(text if len(text) <= longest else text[:longest] + "...")
+    return ascii(text if len(text) <= SHOWN else text[:SHOWN] + "...")
 
 
 @contextmanager

@@ -18,10 +18,9 @@ from typing import Self, TypeVar
 
 import yaml
 
-from drivers.errors import SettingsError, shortened
+from drivers.errors import SHOWN, SettingsError, shortened
 
 MAX_DEPTH = 12
-_SHOWN = 80
 
 
 class NotPlainError(Exception):
@@ -42,10 +41,10 @@ def compose_plain(text: str) -> yaml.Node | None:
         raise NotPlainError(line, "expected text without control characters") from None
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark or error.context_mark
-        words = str(error.problem or error.context)[:_SHOWN]
+        words = str(error.problem or error.context)[:SHOWN]
         raise NotPlainError(mark.line + 1 if mark else 1, f"expected YAML ({words})") from None
     except (ValueError, OverflowError) as error:  # PyYAML lets these out for impossible escapes and versions
-        raise NotPlainError(reader.line + 1, f"expected YAML ({str(error)[:_SHOWN]})") from None
+        raise NotPlainError(reader.line + 1, f"expected YAML ({str(error)[:SHOWN]})") from None
 
 
 class _PlainReader(yaml.SafeLoader):
@@ -57,7 +56,7 @@ class _PlainReader(yaml.SafeLoader):
         event: yaml.Event = super().get_event()
         line = event.start_mark.line + 1 if event.start_mark else 1
         if isinstance(event, yaml.AliasEvent):
-            raise NotPlainError(line, f"expected values written out, found the alias *{str(event.anchor)[:_SHOWN]}")
+            raise NotPlainError(line, f"expected values written out, found the alias *{str(event.anchor)[:SHOWN]}")
         self._depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
         if self._depth > MAX_DEPTH:
             raise NotPlainError(line, f"expected at most {MAX_DEPTH} levels of nesting")
@@ -119,7 +118,7 @@ class Node:
         if isinstance(self.content, str):
             if self.plain and self.content in _NULLS:
                 return "nothing"
-            return shortened(self.content, longest=40)
+            return shortened(self.content)
         return "a list" if isinstance(self.content, tuple) else "a mapping"
 
     def is_null(self) -> bool:

@@ -284,7 +284,7 @@ def _form_of_numbers(lines: list[bytes]) -> str:
 
 
 def _shown(line: bytes) -> str:
-    return shortened(line.decode("utf-8", "replace").strip(), 60)
+    return shortened(line.decode("utf-8", "replace").strip())
 
 
 _EXCHANGED = ("{{expected}} expected, but what comes is {{what}}{{shown}}, as {other} sends: the two ports may be "

@@ -12,8 +12,7 @@ class WindowRecord:
     Times are integer microseconds: ``t_us`` of the monotonic clock at the window's start, ``utc_us`` since
     1970-01-01 UTC of the same instant. Position is that of the window's middle. Intervals are half-open. ``a_w``, MTVV
     and VDV are of the ride alone, with their standard errors; ``raw`` ones of the readings, noise and rounding in them.
-    Rows of older logs have raw values in the first place, and nothing in the last nine, or the last three: the parts of
-    the IRI's standard error that windows share (``streaming.WindowEstimate``).
+    The last three are the parts of the IRI's standard error that windows share (``streaming.WindowEstimate``).
     """
 
     segment: int

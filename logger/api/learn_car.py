@@ -48,7 +48,7 @@ from logger.store.formats import drive_file, vehicle_file
 from logger.store.formats.record_file import TIME, VERTICAL, even_rate_hz
 from logger.store.formats.vehicle_file import CarModel, write_model
 from logger.store.log.log_name import OwnFile, inside_of, log_name
-from logger.store.log.sidecar import load_sidecar
+from logger.store.log.sidecar import read_sidecar
 from logger.units import MPH_MPS
 from logger.vehicle.named_parameters import changed, read
 from logger.vehicle.published_cars import NUMBERS, USUAL_MASS_KG, coordinates_of, number_errors, share_of
@@ -191,8 +191,7 @@ def _of_logs(source: drive_file.Drive | Path | str) -> list[_Used] | None:
     for log in logs:  # the last file of a session has what is kept of all of it
         name = log_name(log)
         try:
-            sidecar = load_sidecar(log)
-            content = sidecar.content if sidecar else {}
+            content = read_sidecar(log) or {}
             if name is not None and (fields := content.get(DRIVE_SPECTRA)):
                 spectra = spectra_of_fields(fields)
                 vehicle = content.get("vehicle")

@@ -80,8 +80,7 @@ class SectionsQuestion(LogsQuestion):
 
     Sections count from the beginning of each drive; the last one is cut short. A section's IRI is the mean of its
     windows, weighted by length; beside it stands how much of the section has an IRI. Its standard error includes the
-    errors that its windows share; logs of older versions do not separate them, and then it counts all errors as
-    shared. Means leave out rows flagged unsettled.
+    errors that its windows share. Means leave out rows flagged unsettled.
 
     With --route, sections follow the kilometres of a line, for each pass over it in either direction. The line may have
     begin_km and end_km; points with a number km are its kilometre posts.

@@ -28,7 +28,7 @@ from logger.printable import cell, word
 from logger.report.summary import NOT_COUNTED
 from logger.roads.sections import WindowErrors, errors_of_means
 from logger.store.log.log_name import log_name
-from logger.store.log.row_format import COLUMNS, FLAGS, HEADERS, LATEST_US, scan
+from logger.store.log.row_format import COLUMNS, FLAGS, HEADER, LATEST_US, scan
 from logger.units import US_PER_S
 
 
@@ -97,7 +97,6 @@ _COUNTS = ("segment", "drive")
 _NUMBERS = ("distance_start_m", "distance_end_m", "lat_deg", "lon_deg", "speed_mps", "iri_m_per_km", "iri_std_m_per_km",
             "a_w_mps2", "duration_s", "iri_level_std_m_per_km", "iri_common_std_m_per_km", "iri_place_std_m_per_km")
 _LARGEST_COUNT = 2**31 - 1  # Of a dataset's column; no logger counts so far
-_HEADERS = tuple(one.encode() for one in HEADERS)
 _LARGEST = {column.name: column.largest for column in COLUMNS}
 
 
@@ -134,13 +133,9 @@ def columns_of(logs: Sequence[tuple[bytes, str]]) -> list[LogColumns]:
     holds what no column may, the reader of logs judges the file row by row, so that both give the same rows; but a
     number that fits its check value and is spelt otherwise than a logger does (1e3) is taken here.
     """
-    headers = {data[:data.find(b"\n")] for data, _ in logs} & set(_HEADERS)
-    if len(headers) > 1:
-        return [one for log in logs for one in columns_of([log])]
-    header = headers.pop() if headers else _HEADERS[0]
-    checked = [_checks(data, header) for data, _ in logs]
+    checked = [_checks(data) for data, _ in logs]
     sizes = [0 if one is None else len(one) for one in checked]
-    whole = _quick(header, [data for (data, _), one in zip(logs, checked, strict=True) if one is not None],
+    whole = _quick([data for (data, _), one in zip(logs, checked, strict=True) if one is not None],
                    np.concatenate([one for one in checked if one is not None] or [np.zeros(0, np.int64)]))
     if whole is None and len(logs) > 1:
         return [one for log in logs for one in columns_of([log])]
@@ -150,10 +145,10 @@ def columns_of(logs: Sequence[tuple[bytes, str]]) -> list[LogColumns]:
             for (data, digest), one, size, last in zip(logs, checked, sizes, end.tolist(), strict=True)]
 
 
-def _checks(data: bytes, wanted: bytes) -> npt.NDArray[np.int64] | None:
+def _checks(data: bytes) -> npt.NDArray[np.int64] | None:
     """The check values of all lines; None where a line does not fit its own, or the header is another."""
     header, _, body = data.partition(b"\n")
-    if header != wanted or not body.endswith(b"\n"):
+    if header != HEADER.encode() or not body.endswith(b"\n"):
         return None
     lines, crc32 = body.splitlines(), zlib.crc32
     checks = [crc32(line[:-9]) for line in lines]
@@ -162,21 +157,20 @@ def _checks(data: bytes, wanted: bytes) -> npt.NDArray[np.int64] | None:
     return np.array(checks, dtype=np.int64)
 
 
-def _quick(header: bytes, logs: Sequence[bytes], checks: npt.NDArray[np.int64]) -> dict[str, npt.NDArray[Any]] | None:
+def _quick(logs: Sequence[bytes], checks: npt.NDArray[np.int64]) -> dict[str, npt.NDArray[Any]] | None:
     """All rows of intact logs, read at once, as each reading costs; None where a row is not what Arrow reads."""
     import pyarrow
     from pyarrow import csv
 
     types = {name: pyarrow.int64() for name in _COUNTS} | {name: pyarrow.float64() for name in (*_NUMBERS, "t_s")}
     types |= {"t_utc": pyarrow.timestamp("us", "UTC"), "flags": pyarrow.string()}
-    start = len(header) + 1
-    data = b"".join([header, b"\n", *(memoryview(log)[start:] for log in logs)])
+    start = len(HEADER) + 1
+    data = b"".join([HEADER.encode(), b"\n", *(memoryview(log)[start:] for log in logs)])
     try:
         table = csv.read_csv(
             io.BytesIO(data), csv.ReadOptions(use_threads=False, block_size=min(max(len(data), 1 << 20), 1 << 30)),
             csv.ParseOptions(quote_char=False, ignore_empty_lines=False),
-            csv.ConvertOptions(include_columns=list(types), column_types=types, null_values=[""],
-                               include_missing_columns=True))
+            csv.ConvertOptions(include_columns=list(types), column_types=types, null_values=[""]))
     except pyarrow.ArrowInvalid:
         return None
     if len(table) != len(checks) or any(table[name].null_count for name in (*_COUNTS, "t_s", "duration_s")):

@@ -28,7 +28,7 @@ from logger.store.export.manifest import is_of_export, read_manifest
 from logger.store.log.log_name import finished_path, inside_of, log_name, name_before, open_path
 from logger.store.log.log_reader import other_recordings
 from logger.store.log.row_format import Row, scan
-from logger.store.log.sidecar import SETTINGS_LOST, Hole, are_in_holes, load_sidecar, repairs_of
+from logger.store.log.sidecar import SETTINGS_LOST, Hole, are_in_holes, read_sidecar, repairs_of
 from logger.units import US_PER_S
 
 DUMP_ENDINGS = (".dump", ".dump.gz")
@@ -231,7 +231,7 @@ def _compare(findings: FileCheck, before: WindowRecord, after: WindowRecord, dam
 
 def _load_sidecar(path: Path, findings: FileCheck) -> dict[str, Any] | None:
     try:
-        sidecar = load_sidecar(path)
+        sidecar = read_sidecar(path)
     except ValueError as error:
         findings.wrong(f"sidecar: {error}")
         return None
@@ -242,11 +242,9 @@ def _load_sidecar(path: Path, findings: FileCheck) -> dict[str, Any] | None:
         if log_name(path):
             findings.wrong(f"sidecar: expected {path.with_suffix('.json').name} beside it; it is missing")
         return None
-    if sidecar.content.get(SETTINGS_LOST) is True:
+    if sidecar.get(SETTINGS_LOST) is True:
         findings.note("sidecar: settings and clock were lost before a repair")
-    elif not sidecar.is_checked:
-        findings.note("sidecar: not checked: it was written without a checksum")
-    return sidecar.content
+    return sidecar
 
 
 def _compare_with_sidecar(sidecar: dict[str, Any], findings: FileCheck) -> None:

@@ -16,6 +16,7 @@ from logger.exchange.layer import Attribute, Feature, Kind, Layer, write_layer
 from logger.printable import LONGEST_WORD
 from logger.shipped import vehicle_file
 from logger.store.log.row_format import HEADER, format_row
+from logger.store.log.sidecar import sealed
 
 from ..support.command import called
 from ..support.drives.logged_rows import repeated_drives
@@ -37,9 +38,9 @@ def stick(tmp_path_factory: pytest.TempPathFactory) -> Path:
         folder = place / word.replace("/", "_")[:60]
         folder.mkdir(parents=True)
         (folder / f"{number:05d}-001.csv").write_text(rows, "ascii")
-        (folder / f"{number:05d}-001.json").write_text(json.dumps({
+        (folder / f"{number:05d}-001.json").write_text(json.dumps(sealed({
             "vehicle": {"name": word[:900_000], word[:50_000]: 1}, "ridelog_version": word[:9000],
-            "sensor": {"driver": word[:9000], "verified": False}, "iri_m_per_km": word[:9000]}))
+            "sensor": {"driver": word[:9000], "verified": False}, "iri_m_per_km": word[:9000]})))
     return place
 
 

@@ -19,6 +19,7 @@ from drivers.readings import GPS, RecordedWords, folder_name
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_model
 from logger.store.log.row_format import HEADER, format_row
+from logger.store.log.sidecar import sealed
 
 from ..support.command import called
 from ..support.drives.logged_rows import rows_of_drive
@@ -139,12 +140,12 @@ def test_logs_whose_words_and_links_name_files_of_this_machine(verb: str, trap: 
     for number in (1, 2):
         (logs / f"0000{number}-001.csv").write_text(rows, "ascii")
     word = str(trap.car)
-    (logs / "00001-001.json").write_text(json.dumps({
+    (logs / "00001-001.json").write_text(json.dumps(sealed({
         "ridelog_version": word, "sensor": {"driver": word, "profile": str(trap.profile)}, "receiver": word,
         "vehicle": {"name": f"../../{trap.folder.name}/x", "effects": [{"name": "x", "file": word}]},
         "settings": {"vehicle": word, "log": {"directory": str(trap.folder)}}, "replayed_from": word,
-        "log": {"session": word, "rows": 60}}))
-    (trap.folder / "other.json").write_text(json.dumps({"vehicle": {"name": "other"}}))
+        "log": {"session": word, "rows": 60}})))
+    (trap.folder / "other.json").write_text(json.dumps(sealed({"vehicle": {"name": "other"}})))
     (trap.folder / "00003-001.csv").write_text(rows, "ascii")
     (logs / "00002-001.json").symlink_to(trap.folder / "other.json")
     (logs / "00003-001.csv").symlink_to(trap.folder / "00003-001.csv")

@@ -16,7 +16,7 @@ from logger.api.fleet import fleet_summarise
 from logger.commands.main import main
 from logger.fleet.dataset import Dataset
 from logger.fleet.ingest import columns_of
-from logger.store.log.row_format import HEADER, HEADERS, format_row, scan
+from logger.store.log.row_format import HEADER, format_row, scan
 
 from ..support.drives.fleet_town import drives, records, town
 
@@ -97,18 +97,6 @@ def test_damage_anywhere_is_judged_as_row_by_row() -> None:
                 ways[way](data)
         logs.append(bytes(data))
     check([*logs, b"", b"\n", HEADER.encode(), whole])
-
-
-def test_logs_of_older_versions_are_read_with_those_of_today() -> None:
-    older = [b"".join(f"{line}\n".encode() for line in [
-        header, *(checked(",".join(row.split(",")[:header.count(",")])) for row in ROWS)]) for header in HEADERS[1:]]
-    logs = [log_of(ROWS), older[0], log_of(ROWS[:5]), older[1], older[0][:-40]]
-    check(logs)
-    check(older[:1] * 3)
-    for data in older:
-        (found,) = columns_of([(data, "")])
-        assert np.isnan(found.columns["iri_level_std_m_per_km"]).all()
-        assert np.isfinite(found.columns["iri_std_m_per_km"]).any()
 
 
 def test_hostile_logs_are_refused_row_by_row_and_counted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

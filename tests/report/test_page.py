@@ -23,6 +23,7 @@ from logger.report.page import FLAG_MEANINGS, page, track_data
 from logger.store.formats.road_lines import read_road_lines
 from logger.store.log.log_reader import LoggedFile
 from logger.store.log.row_format import COLUMNS, HEADER, format_row
+from logger.store.log.sidecar import sealed
 
 from ..support.drives.town import rows_of_town
 
@@ -191,7 +192,8 @@ def test_what_is_not_known_leaves_a_whole_page(drive, changes: dict[str, Any]) -
 
 def write_log(path: Path, rows: list[Any], sidecar: object = SIDECAR, extra: str = "") -> None:
     path.write_text("\n".join([HEADER, *map(format_row, rows)]) + "\n" + extra, encoding="utf-8")
-    (path.parent / f"{path.name.partition('.')[0]}.json").write_text(json.dumps(sidecar), encoding="utf-8")
+    (path.parent / f"{path.name.partition('.')[0]}.json").write_text(
+        json.dumps(sealed(sidecar) if isinstance(sidecar, dict) else sidecar), encoding="utf-8")
 
 
 def test_the_command_reads_a_folder_in_order(drive, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -307,7 +309,7 @@ def test_a_folder_with_the_name_of_a_log_is_no_log(drive, tmp_path: Path, capsys
 
 def test_logs_that_lost_their_settings_in_a_repair_are_named(drive, tmp_path: Path) -> None:
     write_log(tmp_path / "00001-001.csv", drive(5))
-    (tmp_path / "00001-001.json").write_text(json.dumps({"settings_lost": True}), encoding="utf-8")
+    (tmp_path / "00001-001.json").write_text(json.dumps(sealed({"settings_lost": True})), encoding="utf-8")
     assert main.main(["report", str(tmp_path), "--out", str(tmp_path / "p.html")]) == 0
     assert "Their settings were lost before a repair:</span> 00001-001.csv" in (tmp_path / "p.html").read_text("utf-8")
 

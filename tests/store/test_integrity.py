@@ -20,6 +20,7 @@ from logger.store.integrity import SHOWN_PROBLEMS, FileCheck, verify
 from logger.store.log.log_writer import SegmentLog
 from logger.store.log.recovery import repair
 from logger.store.log.row_format import HEADER, format_row
+from logger.store.log.sidecar import sealed
 
 RECORD = WindowRecord(
     segment=1, drive=1, t_us=0, utc_us=None, duration_s=0.5, distance_start_m=None, distance_end_m=None, lat_deg=None,
@@ -413,7 +414,7 @@ def test_a_finished_log_without_its_sidecar_is_wrong(tmp_path: Path) -> None:
     (tmp_path / "00001-001.json").unlink()
     assert found(tmp_path / "00001-001.csv").problems == (
         "sidecar: expected 00001-001.json beside it; it is missing",)
-    (tmp_path / "00001-001.json").write_text('{"log": {"rows": null}}')
+    (tmp_path / "00001-001.json").write_text(json.dumps(sealed({"log": {"rows": None}})))
     assert found(tmp_path / "00001-001.csv").problems == ("sidecar: expected the number of rows of a finished log",)
 
 

@@ -25,7 +25,7 @@ from math import isfinite, nan
 
 import numpy as np
 
-from drivers.errors import shortened
+from drivers.errors import SHOWN, shortened
 from logger.arrays import Array
 from logger.bounds import Quantity
 from logger.errors import BadInput
@@ -33,7 +33,6 @@ from logger.errors import BadInput
 Names = tuple[str, ...]
 
 LINE_BYTES = 64 * 1024
-SHOWN = 40
 _HEAD_LINES, _HEAD_BYTES = 200, 1024 * 1024
 """A header is looked for in so much of a file: the longest block of words above one is a page or two."""
 _DELIMITERS = ("\t", ";", ",", "|")
@@ -440,7 +439,7 @@ def seconds_of_date(text: str) -> float | None:
 
 def shown(text: str) -> str:
     """A piece of a bad file, short enough for a line of complaint."""
-    return shortened(text, SHOWN) if text else "nothing"
+    return shortened(text) if text else "nothing"
 
 
 def _taken_by(names: Names, header: str) -> str:
@@ -455,4 +454,4 @@ def _taken_by(names: Names, header: str) -> str:
 
 def _listed(names: Names) -> str:
     text = ",".join(names)
-    return text if len(text) <= 2 * SHOWN and text.isascii() and text.isprintable() else shown(text)
+    return text if len(text) <= SHOWN and text.isascii() and text.isprintable() else shown(text)

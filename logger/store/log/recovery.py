@@ -14,7 +14,7 @@ from logger.printable import counted
 from logger.store.log import atomic_file
 from logger.store.log import sidecar as sidecars
 from logger.store.log.log_name import COUNTER, OwnFile, finished_path, log_name, open_path, sidecar_path
-from logger.store.log.row_format import HEADER, as_now, format_row
+from logger.store.log.row_format import HEADER, format_row
 
 
 @dataclass(frozen=True)
@@ -222,15 +222,13 @@ def finish_part(files: FileSystem, part: Path, given: dict[str, Any], tally: sid
 def _facts_of(files: FileSystem, log: Path, warn: atomic_file.Warn) -> dict[str, Any]:
     """What a new sidecar of a log takes over from its old one. One that is damaged or cannot be read is put aside."""
     try:
-        sidecar = sidecars.load_sidecar(log, files)
+        content = sidecars.read_sidecar(log, files)
     except ValueError as error:
         why = f"damaged: {error}"
     except OSError as error:
         why = atomic_file.disk_words(error)
     else:
-        if sidecar is None:
-            return {sidecars.SETTINGS_LOST: True}
-        return sidecar.content if sidecar.is_checked else sidecar.content | {sidecars.UNCHECKED: True}
+        return {sidecars.SETTINGS_LOST: True} if content is None else content
     atomic_file.set_aside(files, sidecar_path(log), f"{why}; {finished_path(log).name} has lost its settings and clock",
                           warn)
     return {sidecars.SETTINGS_LOST: True}
@@ -275,7 +273,7 @@ def _lines(rows: Iterable[sidecars.IntactRow], clock: sidecars.ClockMap | None) 
     block_rows = 256
     lines = [HEADER]
     for row in rows:
-        lines.append(as_now(row.text, row.record) if clock is None or row.record.utc_us is not None
+        lines.append(row.text if clock is None or row.record.utc_us is not None
                      else format_row(replace(sidecars.without_utc(row.record), utc_us=row.record.t_us
                                              + clock.offset_us)))
         if len(lines) >= block_rows:

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
 
 from drivers.disk import open_regular
-from drivers.errors import shortened
+from drivers.errors import SHOWN, shortened
 from logger.errors import BadInput
 from logger.records import WindowRecord
 from logger.units import US_PER_S
@@ -38,7 +38,6 @@ _COMFORT = re.compile("[a-z_]{0,40}")
 _CLASS = re.compile("[A-H]?")
 FLAGS = re.compile("[a-z_]{1,40}(?:[|][a-z_]{1,40})*")
 """Words of a row are names of our own; one of a newer logger may be another, and is none that could do harm."""
-_SHOWN = 40  # characters of what is wrong in a row
 _ROW_END = re.compile(rb",[0-9a-f]{8}")
 
 
@@ -70,7 +69,7 @@ def _read_utc(text: str) -> int | None:
     if not text:
         return None
     if not _UTC.fullmatch(text):
-        raise BadRow(f"expected UTC such as 2026-07-04T10:15:00.250Z, found {shortened(text, _SHOWN)}")
+        raise BadRow(f"expected UTC such as 2026-07-04T10:15:00.250Z, found {shortened(text)}")
     utc_us = (datetime.fromisoformat(text) - EPOCH) // timedelta.resolution
     if not 0 <= utc_us < LATEST_US:
         raise BadRow(f"expected UTC from 1970 to 2199, found {text!a}")
@@ -85,14 +84,14 @@ def _write_seconds(t_us: int) -> str:
 def _read_seconds(text: str) -> int:
     match = _SECONDS.fullmatch(text)
     if not match:
-        raise BadRow(f"expected seconds with six decimals, found {shortened(text, _SHOWN)}")
+        raise BadRow(f"expected seconds with six decimals, found {shortened(text)}")
     t_us = int(match[2]) * US_PER_S + int(match[3])
     return -t_us if match[1] else t_us
 
 
 def _read_count(text: str) -> int:
     if not _COUNT.fullmatch(text):
-        raise BadRow(f"expected a whole number, found {shortened(text, _SHOWN)}")
+        raise BadRow(f"expected a whole number, found {shortened(text)}")
     return int(text)
 
 
@@ -100,9 +99,9 @@ def _read_decimal(text: str, pattern: str, largest: float) -> float:
     """A number as the pattern writes it, and in no other way."""
     value = float(text)
     if not isfinite(value) or pattern % value != text:
-        raise BadRow(f"expected a finite number such as {pattern % 1.5}, found {shortened(text, _SHOWN)}")
+        raise BadRow(f"expected a finite number such as {pattern % 1.5}, found {shortened(text)}")
     if abs(value) > largest:
-        raise BadRow(f"expected a number up to {largest:g}, found {shortened(text, _SHOWN)}")
+        raise BadRow(f"expected a number up to {largest:g}, found {shortened(text)}")
     return value
 
 
@@ -141,7 +140,7 @@ def _word(name: str, known: re.Pattern[str], meaning: str) -> LogColumn:
 
 def _read_word(text: str, known: re.Pattern[str]) -> str:
     if not known.fullmatch(text):
-        raise BadRow(f"expected a word that a logger writes, found {shortened(text, _SHOWN)}")
+        raise BadRow(f"expected a word that a logger writes, found {shortened(text)}")
     return text
 
 
@@ -188,15 +187,8 @@ COLUMNS = (
 )
 COLUMN_MEANINGS = {**{column.name: column.meaning for column in COLUMNS}, "crc32": "check value of the row"}
 """What people read of each; the last one ends each line, and is no field of a record."""
-_COUNTS = (len(COLUMNS), 29, 23)
-"""Columns of logs: as they are now, before errors told what windows share of them, and before the ride was separated
-from the noise."""
-
-
-# Of logs of today first, then of older ones.
-HEADERS = tuple(",".join([*(column.name for column in COLUMNS[:count]), "crc32"]) for count in _COUNTS)
-HEADER = HEADERS[0]
-SHORTEST_ROW_BYTES = len("1,,0.000000,,,,,,,,,,,,,,,,1,0.000000,,0,0,00000000\n")
+HEADER = ",".join(COLUMN_MEANINGS)
+SHORTEST_ROW_BYTES = len("1,,0.000000,,,,,,,,,,,,,,,,1,0.000000,,0,0,,,,,,,,,,00000000\n")
 """A row of which nothing is known but what always is."""
 
 
@@ -210,8 +202,7 @@ def format_row(record: WindowRecord) -> str:
 
 
 def parse_row(text: str) -> WindowRecord:
-    """The record of a row, also of an old one that has fewer columns. UTC comes back in whole
-    milliseconds, floats with the decimals of their column.
+    """The record of a row. UTC comes back in whole milliseconds, floats with the decimals of their column.
 
     Raises ``BadRow`` when the check value or any field is not as it should be.
     """
@@ -219,18 +210,13 @@ def parse_row(text: str) -> WindowRecord:
     if f"{zlib.crc32(body.encode('utf-8', 'replace')):08x}" != check:
         raise BadRow("expected a row that matches its crc32")
     fields = body.split(",")
-    if len(fields) not in _COUNTS:
+    if len(fields) != len(COLUMNS):
         raise BadRow(f"expected {len(COLUMNS) + 1} columns, found {len(fields) + 1}")
     try:
         return WindowRecord(**{column.attribute: column.read(field)
-                               for column, field in zip(COLUMNS, fields, strict=False)})
+                               for column, field in zip(COLUMNS, fields, strict=True)})
     except ValueError as error:  # a number or a date that is none
-        raise BadRow(str(error)[:2 * _SHOWN]) from None
-
-
-def as_now(text: str, record: WindowRecord) -> str:
-    """An intact row as rows are written now, so that a file does not hold rows of two kinds."""
-    return text if text.count(",") == len(COLUMNS) else format_row(record)
+        raise BadRow(str(error)[:SHOWN]) from None
 
 
 class Row(NamedTuple):
@@ -260,10 +246,8 @@ def scan(file: BinaryIO) -> Iterator[Row]:
         text = line.removesuffix(b"\n")
         torn = len(text) == len(line) < LINE_BYTES
         if number == 1:
-            if text not in [one.encode() for one in HEADERS]:
-                header = next((one for one in HEADERS if text.startswith(one.encode())), "")
-                rest = text[len(header) + 1:] if header else text
-                yield from _salvaged(1, rest, torn)
+            if text != HEADER.encode():
+                yield from _salvaged(1, text.removeprefix(HEADER.encode()), torn)
                 yield Row(1, "", None, "expected the header line of a segment log", torn, len(text))
             continue
         try:
@@ -299,7 +283,7 @@ def _salvaged(number: int, line: bytes, torn: bool) -> Iterator[Row]:
     """The intact rows inside a damaged line: those whose newline was lost."""
     start = 0
     for end in _ROW_END.finditer(line):
-        if line.count(b",", start, end.end()) not in _COUNTS:
+        if line.count(b",", start, end.end()) != len(COLUMNS):
             continue
         row = line[start:end.end()].decode("ascii", "replace")
         try:

@@ -7,8 +7,7 @@ before a row that does not follow the one before it, and they are long enough, r
 a reader can distinguish what was damaged from what was never written.
 
 Problem. A scale or a clock with one wrong digit makes every row wrong, though each fits its own check value. Solution.
-The content carries a checksum of itself, and nothing is read of a sidecar that does not fit it. Those of older versions
-have none; they are read, and said to be unchecked.
+The content carries a checksum of itself, and nothing is read of a sidecar that does not fit it.
 """
 
 from __future__ import annotations
@@ -171,7 +170,6 @@ def _add(holes: list[Hole], hole: Hole) -> None:
         holes[-1] = Hole(holes[-1].first, hole.last)
 
 
-UNCHECKED = "taken_over_unchecked"  # In a sidecar that a repair has made of one without a checksum
 SETTINGS_LOST = "settings_lost"  # In a sidecar that a repair has made where there was none that could be read
 _SEAL = frozenset({"format", "sha256"})
 
@@ -183,17 +181,8 @@ class ClockMap:
     offset_us: int
 
 
-@dataclass(frozen=True)
-class Sidecar:
-    """What lies beside a log. ``is_checked``: it fits its checksum, and always did; False: an older version wrote it,
-    without one, and a repair may have taken it over."""
-
-    content: dict[str, Any]
-    is_checked: bool
-
-
-def load_sidecar(log: Path, files: FileSystem | None = None) -> Sidecar | None:
-    """The sidecar of a log file, open or finished; None when it is missing. Raises ``ValueError`` when it is damaged,
+def read_sidecar(log: Path, files: FileSystem | None = None) -> dict[str, Any] | None:
+    """What lies beside a log file, open or finished; None when it is missing. Raises ``ValueError`` when it is damaged,
     a link, nested too deep or larger than ``STATE_BYTES``, and ``OSError``."""
     path = sidecar_path(log)
     if path.is_symlink():
@@ -214,16 +203,9 @@ def load_sidecar(log: Path, files: FileSystem | None = None) -> Sidecar | None:
     if not isinstance(found, dict):
         raise ValueError("expected a JSON object")
     content = {key: value for key, value in found.items() if key not in _SEAL}
-    is_sealed = not _SEAL.isdisjoint(found)
-    if is_sealed and not _fits(found, content):
+    if not _fits(found, content):
         raise ValueError("expected content that matches its checksum")
-    return Sidecar(content, is_sealed and content.get(UNCHECKED) is not True)
-
-
-def read_sidecar(log: Path, files: FileSystem | None = None) -> dict[str, Any] | None:
-    """The content of ``load_sidecar``."""
-    sidecar = load_sidecar(log, files)
-    return None if sidecar is None else sidecar.content
+    return content
 
 
 def store_sidecar(files: FileSystem, log: Path, given: dict[str, Any], state: str, tally: Tally,
@@ -244,19 +226,19 @@ def store_sidecar(files: FileSystem, log: Path, given: dict[str, Any], state: st
         },
     }
     plain = json.loads(json.dumps(content, allow_nan=False))  # keys and lists as a reader will find them
-    text = json.dumps(_sealed(plain), indent=2) + "\n"
+    text = json.dumps(sealed(plain), indent=2) + "\n"
     replace_file(files, sidecar_path(log), [text.encode()])
 
 
-def _sealed(content: dict[str, Any]) -> dict[str, Any]:
-    """Content with its checksum. There are two keys, so that no single damage makes it one that never had any."""
+def sealed(content: dict[str, Any]) -> dict[str, Any]:
+    """Content with its format and its checksum."""
     sealed = content | {"format": 1}
     return sealed | {"sha256": json_sha256(sealed)}
 
 
 def _fits(found: dict[str, Any], content: dict[str, Any]) -> bool:
     try:
-        return found == _sealed(content)
+        return found == sealed(content)
     except RecursionError:  # nested as no content of ours
         return False
 

@@ -12,7 +12,7 @@ from logger.store.integrity import verify
 from logger.store.log.log_writer import SegmentLog
 from logger.store.log.recovery import repair
 from logger.store.log.row_format import HEADER, format_row, read_log
-from logger.store.log.sidecar import MOST_HOLES, ClockMap, read_sidecar
+from logger.store.log.sidecar import MOST_HOLES, ClockMap, read_sidecar, sealed
 
 from ...support.faults.crashes import FACTS, OFFSET_US, problems, window
 from ...support.faults.log_damage import HAZARDS
@@ -93,7 +93,7 @@ def test_more_holes_than_are_listed_are_one(tmp_path: Path) -> None:
 @pytest.mark.parametrize("holes", [7, [7], [[2]], [[2, "4"]], [[True, 5]], [[3, 4]], [[2, 3]], {"2": 4}])
 def test_holes_that_are_none_excuse_nothing(tmp_path: Path, holes: object) -> None:
     (tmp_path / "00001-001.csv").write_text(rows_of(1, 5))
-    (tmp_path / "00001-001.json").write_text(json.dumps({"log": {"rows": 2, "segments_lost": holes}}))
+    (tmp_path / "00001-001.json").write_text(json.dumps(sealed({"log": {"rows": 2, "segments_lost": holes}})))
     assert problems(tmp_path) == ["line 3: gap: expected segment 2, found 5"]
 
 

@@ -19,7 +19,7 @@ from logger.store.log.log_name import COUNTER_NAME, next_session
 from logger.store.log.log_writer import SegmentLog
 from logger.store.log.recovery import repair
 from logger.store.log.row_format import HEADER, format_row, parse_row, read_log
-from logger.store.log.sidecar import ClockMap, read_sidecar
+from logger.store.log.sidecar import ClockMap, read_sidecar, sealed
 
 from ...support.slow import slow
 
@@ -481,13 +481,14 @@ def test_a_hostile_sidecar_is_refused_and_costs_no_row(tmp_path: Path, content: 
 def test_a_clock_that_cannot_be_is_none(tmp_path: Path, offset_us: object) -> None:
     log = SegmentLog(tmp_path, 1, SIDECAR, 10**6)
     log.append(row(1, utc=False))
-    (tmp_path / "00001-001.json").write_text(json.dumps({"clock_map": {"offset_us": offset_us}}))
+    (tmp_path / "00001-001.json").write_text(json.dumps(sealed({"clock_map": {"offset_us": offset_us}})))
     repair(tmp_path)
     assert read_log(tmp_path / "00001-001.csv").records == (kept(row(1, utc=False)),)
 
 
 def test_a_sidecar_of_the_largest_size_is_read(tmp_path: Path) -> None:
-    (tmp_path / "00001-001.json").write_bytes(b"{}" + b" " * (STATE_BYTES - 2))
+    text = json.dumps(sealed({})).encode()
+    (tmp_path / "00001-001.json").write_bytes(text + b" " * (STATE_BYTES - len(text)))
     assert read_sidecar(tmp_path / "00001-001.csv") == {}
 
 

@@ -16,13 +16,11 @@ from logger.records import WindowRecord
 from logger.store.log.row_format import (
     COLUMNS,
     HEADER,
-    HEADERS,
     LARGEST,
     LINE_BYTES,
     SHORTEST_ROW_BYTES,
     BadRow,
     LogColumn,
-    as_now,
     format_row,
     parse_row,
     read_log,
@@ -38,17 +36,15 @@ RECORD = WindowRecord(
     vdv_std_mps175=0.04, a_w_raw_mps2=0.5, mtvv_raw_mps2=0.95, vdv_raw_mps175=1.3, iri_level_std_m_per_km=0.3,
     iri_common_std_m_per_km=0.1, iri_place_std_m_per_km=0.25,
 )
-NOTHING_SHARED = dict.fromkeys(("iri_level_std_m_per_km", "iri_common_std_m_per_km", "iri_place_std_m_per_km"))
-NOTHING_NEW = {"a_w_std_mps2": None, "mtvv_std_mps2": None, "vdv_std_mps175": None, "a_w_raw_mps2": None,
-               "mtvv_raw_mps2": None, "vdv_raw_mps175": None, **NOTHING_SHARED}
-OLD_BODY = ("123,2026-07-04T10:15:00.250Z,1234.567890,1000.125,1007.745,-50.0876543,14.4212345,16.700,2.345,0.600,"
-            "2.345,0.4321,0.9000,1.2340,3.200,a_little_uncomfortable,A,clipped|gap,2,0.456789,0.6543,46,1")
-LAST_BODY = OLD_BODY + ",0.0200,0.0300,0.0400,0.5000,0.9500,1.3000"
-BODY = LAST_BODY + ",0.300,0.100,0.250"
+BODY = ("123,2026-07-04T10:15:00.250Z,1234.567890,1000.125,1007.745,-50.0876543,14.4212345,16.700,2.345,0.600,"
+        "2.345,0.4321,0.9000,1.2340,3.200,a_little_uncomfortable,A,clipped|gap,2,0.456789,0.6543,46,1,"
+        "0.0200,0.0300,0.0400,0.5000,0.9500,1.3000,0.300,0.100,0.250")
 UNKNOWN = replace(
     RECORD, utc_us=None, distance_start_m=None, distance_end_m=None, lat_deg=None, lon_deg=None, speed_mps=None,
     iri_m_per_km=None, iri_std_m_per_km=None, iri_rms_m_per_km=None, a_w_mps2=None, mtvv_mps2=None, vdv_mps175=None,
-    crest_factor=None, accel_rms_mps2=None, comfort="", iri_class="", flags=(), **NOTHING_NEW,
+    crest_factor=None, accel_rms_mps2=None, comfort="", iri_class="", flags=(),
+    a_w_std_mps2=None, mtvv_std_mps2=None, vdv_std_mps175=None, a_w_raw_mps2=None, mtvv_raw_mps2=None,
+    vdv_raw_mps175=None, iri_level_std_m_per_km=None, iri_common_std_m_per_km=None, iri_place_std_m_per_km=None,
 )
 CONTRACT = ("segment,t_utc,t_s,distance_start_m,distance_end_m,lat_deg,lon_deg,speed_mps,iri_m_per_km,"
             "iri_std_m_per_km,iri_rms_m_per_km,a_w_mps2,mtvv_mps2,vdv_mps175,crest_factor,comfort,iri_class,flags,")
@@ -242,26 +238,4 @@ def test_no_row_is_shorter_than_one_of_which_nothing_is_known() -> None:
     counts = {"segment": 1, "t_us": 0, "comfort": "", "iri_class": "", "flags": (), "drive": 1, "duration_s": 0.0,
               "samples": 0, "clipped_samples": 0}
     shortest = format_row(WindowRecord(**(unknown | counts)))
-    assert len(shortest) + 1 - len(NOTHING_NEW) == SHORTEST_ROW_BYTES  # those of old logs are the shorter ones
-
-
-@pytest.mark.parametrize(("body", "header", "nothing"), [
-    (OLD_BODY, HEADERS[2], NOTHING_NEW), (LAST_BODY, HEADERS[1], NOTHING_SHARED)], ids=["oldest", "last"])
-def test_rows_of_old_logs_are_read_and_end_without_what_they_did_not_hold(
-    body: str, header: str, nothing: dict[str, None]
-) -> None:
-    assert header.count(",") == body.count(",") + 1
-    assert parse_row(checked(body)) == replace(parse_row(checked(BODY)), **nothing)
-    data = f"{header}\n{checked(body)}\n".encode()
-    assert intact(data) == [checked(body)]
-    assert damaged(data) == 0
-    beside_a_lost_newline = f"{header}\n{checked(body)}x{checked(body)}\n".encode()
-    assert intact(beside_a_lost_newline)
-    assert damaged(beside_a_lost_newline) == 1
-
-
-@pytest.mark.parametrize(("body", "missing"), [(OLD_BODY, 9), (LAST_BODY, 3)], ids=["oldest", "last"])
-def test_an_old_row_is_written_again_as_rows_are_now(body: str, missing: int) -> None:
-    old, now = checked(body), checked(body + "," * missing)
-    assert as_now(old, parse_row(old)) == now
-    assert as_now(now, parse_row(now)) is now
+    assert len(shortest) + 1 == SHORTEST_ROW_BYTES

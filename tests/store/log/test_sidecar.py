@@ -11,10 +11,9 @@ import pytest
 from logger.store.integrity import FileCheck, verify
 from logger.store.log.log_writer import SegmentLog
 from logger.store.log.recovery import repair
-from logger.store.log.row_format import read_log
 from logger.store.log.sidecar import read_sidecar
 
-from ...support.faults.crashes import FACTS, OFFSET_US, window
+from ...support.faults.crashes import FACTS, window
 
 
 @pytest.fixture
@@ -56,17 +55,10 @@ def test_a_changed_sidecar_is_refused(log: Path, change: dict[str, Any]) -> None
         read_sidecar(log)
 
 
-def test_one_without_its_checksum_is_changed(log: Path) -> None:
-    content = stored(log)
-    del content["sha256"]
+@pytest.mark.parametrize("keys", [("sha256",), ("sha256", "format")])
+def test_one_without_its_checksum_is_changed(log: Path, keys: tuple[str, ...]) -> None:
+    content = {key: value for key, value in stored(log).items() if key not in keys}
     assert store(log, content).problems == ("sidecar: expected content that matches its checksum",)
-
-
-def test_one_of_an_older_version_is_read_and_said_to_be_unchecked(log: Path) -> None:
-    content = {key: value for key, value in stored(log).items() if key in (*FACTS, "clock_map", "log")}
-    check = store(log, content)
-    assert (check.ok, check.notes) == (True, ("sidecar: not checked: it was written without a checksum",))
-    assert read_sidecar(log) == content
 
 
 def test_facts_of_any_json_value_fit_their_checksum(tmp_path: Path) -> None:
@@ -75,15 +67,6 @@ def test_facts_of_any_json_value_fit_their_checksum(tmp_path: Path) -> None:
     log.append(window(1, utc=True))
     log.close()
     assert verify([tmp_path])[0].problems == ()
-
-
-def test_an_open_part_with_an_older_sidecar_gets_its_utc(tmp_path: Path) -> None:
-    log = SegmentLog(tmp_path, 1, FACTS, 10**6)
-    log.append(window(1, utc=False))
-    (tmp_path / "00001-001.json").write_text(json.dumps({"clock_map": {"offset_us": OFFSET_US}}))
-    repair(tmp_path)
-    assert read_log(tmp_path / "00001-001.csv").records[0].utc_us is not None
-    assert verify([tmp_path])[0].notes == ("sidecar: not checked: it was written without a checksum",)
 
 
 def test_a_damaged_sidecar_of_an_open_part_is_kept_beside(tmp_path: Path) -> None:

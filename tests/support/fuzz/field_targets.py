@@ -34,7 +34,7 @@ from logger.store.formats.profile_file import read_excitation, read_places, read
 from logger.store.formats.record_file import read_columns as read_record_columns
 from logger.store.formats.road_lines import read_map_ways, read_road_lines, read_route
 from logger.store.formats.vehicle_file import read_model
-from logger.store.log.sidecar import load_sidecar
+from logger.store.log.sidecar import read_sidecar
 
 from . import fields, targets
 from .mutation import Target
@@ -292,7 +292,7 @@ def _small(name: str, path: Path) -> Hashable:
             return read_note(path) is None
         case _:
             try:
-                return load_sidecar(path.with_suffix(".csv")) is None
+                return read_sidecar(path.with_suffix(".csv")) is None
             except ValueError:
                 return "refused"
 
