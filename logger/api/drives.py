@@ -23,7 +23,6 @@ from logger.chart_data import Array, Chart, Curves, Line, line
 from logger.dsp.channel_faults import released_at
 from logger.errors import BadInput
 from logger.estimation.batch import (
-    MIX_IRI,
     RESOLVED_SHARE,
     SPEED_CLASS_MPS,
     Assessment,
@@ -33,6 +32,7 @@ from logger.estimation.batch import (
     figures,
     speed_classes,
 )
+from logger.estimation.rms_calibration import LEVELS_IRI
 from logger.estimation.sensor_noise import NOISE_MPS2, Sensor
 from logger.files import make_folder, together, write_text
 from logger.profiles.excitation import Excitation
@@ -431,7 +431,7 @@ def blocks(found: Assessment, summary: dict[str, Any]) -> Iterator[Block]:
     limits = [
         "The limit, an estimator that knows road, car and noise exactly: standard error "
         f"{limit['std_m_per_km']:.2f} m/km at {summary['speed_mps']:.0f} m/s; R2 {limit['r2_iri_1_to_10']:.3f} over "
-        f"roads of IRI {MIX_IRI[0]} to {MIX_IRI[-1]}, {limit['r2_this_road']:.3f} on a road like this one.",
+        f"roads of IRI {LEVELS_IRI[0]:g} to {LEVELS_IRI[-1]:g}, {limit['r2_this_road']:.3f} on a road like this one.",
         "Wavelengths resolved: " + _range_words(found),
     ]
     if (factor := summary["iri_std_m_per_km"] / limit["std_m_per_km"]) > _FAR_ABOVE:

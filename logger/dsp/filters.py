@@ -161,7 +161,7 @@ def butterworth(order: int, s: Complex, cutoff_hz: float, sampled_hz: float = 0.
 
 
 _SAMPLES_PER_PERIOD = 2.5
-_STOP_DB = 60.0
+STOP_DB = 60.0
 
 
 def kaiser_half_length(stop_db: float, width: float) -> float:
@@ -260,9 +260,9 @@ class DecimatingLowPass:
     @property
     def _half(self) -> int:
         pass_hz, stop_hz = self._edges
-        return ceil(kaiser_half_length(_STOP_DB, 2 * np.pi * (stop_hz - pass_hz) / self.rate_hz))
+        return ceil(kaiser_half_length(STOP_DB, 2 * np.pi * (stop_hz - pass_hz) / self.rate_hz))
 
     def _kernel(self, place: Array) -> Array:
         """The filter at places counted in samples from its middle."""
-        window = kaiser_window(place, self._half + 1, _STOP_DB)
+        window = kaiser_window(place, self._half + 1, STOP_DB)
         return np.asarray(np.sinc(sum(self._edges) / self.rate_hz * place) * window)

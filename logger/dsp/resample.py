@@ -203,8 +203,8 @@ def _lagrange(t_us: Times, values: Array, at_us: Times) -> Array:
 
 
 PASS_HZ = 38.0
-STOP_HZ = 62.0
 GRID_RATE_HZ = 100
+PASS_OF_RATE = PASS_HZ / GRID_RATE_HZ
 STOP_DB = 65.0
 BLOCK = 16
 BRIDGED_SHARE = 0.5
@@ -216,7 +216,7 @@ def decimation_taps(factor: int) -> Array:
     Passes 0-38 Hz within 0.01 dB and stops what would fold into that band, from 62 Hz up, by 64 dB; half the
     amplitude at 50 Hz. h is a multiple of ``factor``.
     """
-    width = 2.0 * math.pi * (STOP_HZ - PASS_HZ) / (GRID_RATE_HZ * factor)
+    width = 2.0 * math.pi * (1 - 2 * PASS_OF_RATE) / factor
     half = factor * math.ceil(kaiser_half_length(STOP_DB, width) / factor)
     return low_pass_taps(half, factor, 1.0, STOP_DB)
 

@@ -33,10 +33,10 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.arrays import Array, Complex
-from logger.dsp.filters import kaiser_half_length, kaiser_window, low_pass_taps
+from logger.dsp.filters import STOP_DB, kaiser_half_length, kaiser_window, low_pass_taps
 
 _REACH = 12  # grid steps on either side
-_STOP_DB = 70.0
+_KERNEL_STOP_DB = 70.0
 _RIDGE = 1e-2
 _CHUNK, _MARGIN = 4096, 48
 _BAND_REACH = 24  # steps of the lower rate
@@ -53,7 +53,7 @@ class _Kernel:
     def __init__(self, offsets: npt.NDArray[np.floating[Any]], half: float, cutoff: float) -> None:
         self._phases = ceil(_PHASES * cutoff)
         apart = np.arange(self._phases + 1)[:, None] / self._phases + offsets
-        self._table = np.sinc(cutoff * apart) * kaiser_window(apart, half, _STOP_DB)
+        self._table = np.sinc(cutoff * apart) * kaiser_window(apart, half, _KERNEL_STOP_DB)
         self._steps = np.diff(self._table, axis=0)
 
     def at(self, share: Array) -> Array:
@@ -165,7 +165,6 @@ def thinned(samples: Array, factor: int) -> Array:
     return found[before // factor :][: -(-count // factor)]
 
 
-_BAND_STOP_DB = 60.0
 HALF_WIDTH_HZ = 1.0
 """From an end of the band to where the filter passes all, and to where it passes nothing. It costs 0.9 s of record on
 either side (``reach``): in front of it half of the 2 s that are left out of every run."""
@@ -184,13 +183,13 @@ def in_band(samples: Array, rate_hz: float, low_hz: float, high_hz: float) -> Ar
 
 def reach(rate_hz: float) -> int:
     """How many samples at an end of a record are not what they would be, had it gone on, where its band is cut."""
-    return ceil(kaiser_half_length(_BAND_STOP_DB, 4 * np.pi * HALF_WIDTH_HZ / rate_hz))
+    return ceil(kaiser_half_length(STOP_DB, 4 * np.pi * HALF_WIDTH_HZ / rate_hz))
 
 
 def _low_passed(samples: Array, cutoff_hz: float, half_width_hz: float, rate_hz: float) -> Array:
     from scipy.fft import next_fast_len
 
-    half = ceil(kaiser_half_length(_BAND_STOP_DB, 4 * np.pi * half_width_hz / rate_hz))
+    half = ceil(kaiser_half_length(STOP_DB, 4 * np.pi * half_width_hz / rate_hz))
     held = np.pad(samples, half, mode="edge")
     size = next_fast_len(len(held), real=True)
     gain = _gain(half, 2 * cutoff_hz / rate_hz, size)
@@ -200,4 +199,4 @@ def _low_passed(samples: Array, cutoff_hz: float, half_width_hz: float, rate_hz:
 @lru_cache(maxsize=32)  # records of one length pass the same filter hundreds of times
 def _gain(half: int, cutoff: float, size: int) -> Complex:
     """Transform of the taps of a low-pass, the first at 0, over so many samples."""
-    return np.fft.rfft(low_pass_taps(half, 1, cutoff, _BAND_STOP_DB), size)
+    return np.fft.rfft(low_pass_taps(half, 1, cutoff, STOP_DB), size)

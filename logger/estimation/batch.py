@@ -10,8 +10,8 @@ and shorter than the shortest resolved wavelength are taken out. That range chan
 for the whole drive, the one resolved over at least ``RESOLVED_SHARE`` of the distance at either end. Where a piece is
 missing one part of the profile ends and another begins.
 
-A piece says which wavelengths the readings resolve; beyond ``LONGEST_M`` the estimator expects no more of a road than
-at it (``RoadSpectrum``), as roads of ISO 8608 end there too.
+A piece says which wavelengths the readings resolve; beyond 100 m (``FLATTENED_BELOW_CPM``) the estimator expects no
+more of a road than there (``RoadSpectrum``), as roads of ISO 8608 end there too.
 
 A record may be in other units, its distance may jump or go back: ``estimable`` refuses what cannot be meant. And an
 estimate alone does not say how good it is or could be: ``assess`` sets beside it what an estimator could reach that
@@ -31,13 +31,16 @@ import numpy as np
 
 from logger.arrays import Array, Bools
 from logger.bounds import time_hint
+from logger.dsp.weightings.weighting import LOWEST_RATE_HZ
+from logger.estimation.car_response import SPEEDS_PER_E
 from logger.estimation.error_bound import ErrorBound, pooled_r2
+from logger.estimation.rms_calibration import LEVELS_IRI
 from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM, RoadSpectrum
 from logger.estimation.sensor_noise import UNKNOWN_LOG_STD, NoiseBelief, Sensor
 from logger.estimation.streaming import RoadEstimator, RoadPiece
 from logger.estimation.time_grid import RATE_HZ
 from logger.profiles.track import Track
-from logger.roads.iri import START_M, likely_unit, rectified_slope, window_iri
+from logger.roads.iri import COARSEST_SPACING_M, START_M, likely_unit, rectified_slope, window_iri
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, RoadEffect
 from logger.vehicle.linearise import KnownCar, known_car
@@ -48,20 +51,14 @@ LEVEL_REACH_M = 50.0
 """A window's road is as rough as the mean of the windows so far to both sides."""
 _SMOOTHEST_M_PER_KM = 0.1
 _NOISE_ROUNDS, _NEAR_ENOUGH = 3, 0.3
-_COARSEST_M = 0.25
 _SMOOTHED_S = 2.0
 _FINEST_RATIO = 2000
 RESOLVED_SHARE = 0.75
-LONGEST_M = 1 / FLATTENED_BELOW_CPM
 _ORDER = 8
 _NEARLY_SPACINGS = 1e-3
-_STEPS_PER_E = 20  # limits are computed for speeds and levels in steps of 5 %
-MIX_IRI = tuple(range(1, 11))
-"""Roads over which the limit's R2 is computed, as many of each [m/km]."""
 BACK_M = 1.0
 """A distance may go back so far, as one that is corrected by GPS does."""
 SPEED_CLASS_MPS = 5.0
-_SLOWEST_RATE_HZ = 80.0
 _NEARLY = 1e-6
 _WAYS_DIFFER = 0.1
 _LEAST_WAY_M = 10.0  # over less, a distance from GPS may well differ from the integral of the speed
@@ -175,8 +172,8 @@ def exact_iri(edges_m: Array, elevation_m: Array, spacing_m: float, start_m: flo
     the IRI of the profile alone, for which it starts with the profile's mean slope. A profile too coarse for the IRI
     is the straight lines between its samples.
     """
-    if spacing_m > _COARSEST_M:
-        parts = ceil(spacing_m / _COARSEST_M)
+    if spacing_m > COARSEST_SPACING_M:
+        parts = ceil(spacing_m / COARSEST_SPACING_M)
         place = np.arange((len(elevation_m) - 1) * parts + 1) / parts
         elevation_m, spacing_m = np.interp(place, np.arange(len(elevation_m)), elevation_m), spacing_m / parts
     lead = ceil(START_M / spacing_m)
@@ -238,13 +235,13 @@ def least_errors(limits: ErrorBound, speed_mps: Array, level_m_per_km: Array) ->
 
     @cache
     def least(speed_step: int, level_step: int) -> float:
-        spectrum = RoadSpectrum.of_iri(exp(level_step / _STEPS_PER_E))
-        return limits.at(exp(speed_step / _STEPS_PER_E), spectrum).std_m_per_km
+        spectrum = RoadSpectrum.of_iri(exp(level_step / SPEEDS_PER_E))
+        return limits.at(exp(speed_step / SPEEDS_PER_E), spectrum).std_m_per_km
 
     known = np.isfinite(level_m_per_km)
     level = np.maximum(level_m_per_km, _SMOOTHEST_M_PER_KM)
     result = np.full(len(speed_mps), np.nan)
-    steps = (np.round(np.log(row[known]) * _STEPS_PER_E).astype(int).tolist() for row in (speed_mps, level))
+    steps = (np.round(np.log(row[known]) * SPEEDS_PER_E).astype(int).tolist() for row in (speed_mps, level))
     result[known] = [least(speed, level) for speed, level in zip(*steps, strict=True)]
     return result
 
@@ -285,7 +282,8 @@ def road_profile(pieces: Sequence[RoadPiece]) -> RoadProfile | None:
     if not resolved or len(resolved) < RESOLVED_SHARE * len(pieces):
         return None
     shortest_m = float(np.quantile([piece.shortest_m for piece in resolved], RESOLVED_SHARE))
-    longest_m = float(np.quantile([min(piece.longest_m, LONGEST_M) for piece in resolved], 1 - RESOLVED_SHARE))
+    longest_m = min(float(np.quantile([piece.longest_m for piece in resolved], 1 - RESOLVED_SHARE)),
+                    1 / FLATTENED_BELOW_CPM)
     if shortest_m >= longest_m:
         return None
     joined = [_joined(run) for run in _runs(resolved)]
@@ -356,8 +354,8 @@ def estimable(
 ) -> Estimable:
     """A drive of samples (n,) at an even rate, made ready. ``Unusable`` for one too slow, for a distance that jumps
     (faster than ``fastest_mps``) or goes back farther than a correction, and for a speed that does not go with it."""
-    if rate_hz < _SLOWEST_RATE_HZ * (1 - 1e-3):
-        raise Unusable(f"expected at least {_SLOWEST_RATE_HZ:g} samples a second, found {rate_hz:.4g}"
+    if rate_hz < LOWEST_RATE_HZ * (1 - 1e-3):
+        raise Unusable(f"expected at least {LOWEST_RATE_HZ:g} samples a second, found {rate_hz:.4g}"
                        f"{time_hint(rate_hz)}")
     _check_way(distance_m, fastest_mps / rate_hz)
     _check_speed(rate_hz, speed_mps, distance_m)
@@ -488,7 +486,7 @@ def figures(found: Assessment, which: Bools) -> dict[str, Any]:
         "limit": {
             "std_m_per_km": _rms(least),
             "r2_this_road": found.limits.at(speed_mps, RoadSpectrum.of_iri(mean)).r2,
-            "r2_iri_1_to_10": pooled_r2([found.limits.at(speed_mps, RoadSpectrum.of_iri(iri)) for iri in MIX_IRI]),
+            "r2_iri_1_to_10": pooled_r2([found.limits.at(speed_mps, RoadSpectrum.of_iri(iri)) for iri in LEVELS_IRI]),
         },
     }
     compared = score(windows, found.exact_m_per_km, which)

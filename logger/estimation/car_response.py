@@ -19,12 +19,9 @@ from logger.vehicle.models import GOLDEN_CAR, quarter_car
 from logger.vehicle.structure import suspension_travel
 
 HIGHEST_HZ = 42.0  # recorders pass less from here on
-_SPEEDS_PER_E = 20  # speeds within 2.5 % share one power response
+SPEEDS_PER_E = 20  # speeds within 2.5 % share one response
 WAVE_NUMBERS_CPM = np.geomspace(0.004, 3.3, 300)
 LOG_WAVES = log_waves(WAVE_NUMBERS_CPM)
-# Steps of 4 %: a fifth of the width of a resonance with a tenth of critical damping.
-_TABLE_HZ = np.geomspace(0.1, 1.05 * HIGHEST_HZ, 160)
-_LOG_TABLE_HZ = np.log(_TABLE_HZ)
 WAVE_NUMBER_STEPS_CPM = WAVE_NUMBERS_CPM * log(WAVE_NUMBERS_CPM[1] / WAVE_NUMBERS_CPM[0])
 
 
@@ -51,10 +48,8 @@ class CarResponse:
     def by_axle(self, f_hz: Array) -> Complex:
         """Reading per elevation under each axle, (x, f) [1/s2]; nothing at 0 Hz and above what recorders pass."""
         seen = (f_hz > 0) & (f_hz <= HIGHEST_HZ)
-        by_wheel = self._car.by_wheel(f_hz[seen])
         response = np.zeros((len(self.behind_m), len(f_hz)), np.complex128)
-        for axle, row in enumerate(response):
-            row[seen] = by_wheel[:, self._axle == axle].sum(axis=1)
+        response[:, seen] = (self._car.by_wheel(f_hz[seen]) @ np.eye(len(self.behind_m))[self._axle]).T
         return response
 
     def power_apart(self, speed_mps: float) -> Array:
@@ -72,26 +67,12 @@ class CarResponse:
 
         The speed is rounded to steps of 5 %, and what was computed is kept.
         """
-        key = round(log(speed_mps) * _SPEEDS_PER_E)
+        key = round(log(speed_mps) * SPEEDS_PER_E)
         if key not in self._powers:
-            self._find_powers([key])
+            speed_mps = exp(key / SPEEDS_PER_E)
+            f_hz = WAVE_NUMBERS_CPM * speed_mps
+            self._powers[key] = np.abs(self._car.response(f_hz, speed_mps)) ** 2 * (f_hz <= HIGHEST_HZ)
         return self._powers[key]
-
-    def powers(self, speeds_mps: Sequence[float]) -> Array:
-        """The same for several speeds (v,), as (v, n)."""
-        keys = [round(log(speed) * _SPEEDS_PER_E) for speed in speeds_mps]
-        missing = [key for key in dict.fromkeys(keys) if key not in self._powers]
-        if missing:
-            self._find_powers(missing)
-        return np.array([self._powers[key] for key in keys]).reshape(len(keys), len(WAVE_NUMBERS_CPM))
-
-    def _find_powers(self, keys: Sequence[int]) -> None:
-        """For rounded speeds, side by side: that costs less than one after the other."""
-        f_hz = WAVE_NUMBERS_CPM * np.exp(np.array(keys) / _SPEEDS_PER_E)[:, None]
-        delays = np.exp(-2j * np.pi * self.behind_m[:, None] * WAVE_NUMBERS_CPM)
-        by_axle = self.by_axle(f_hz.ravel()).reshape(len(self.behind_m), *f_hz.shape)
-        gains = (by_axle * delays[:, None]).sum(axis=0) * np.sinc(WAVE_NUMBERS_CPM * self.contact_patch_m)
-        self._powers.update(zip(keys, np.abs(gains) ** 2, strict=True))
 
     @property
     def is_exact(self) -> bool:
@@ -101,40 +82,16 @@ class CarResponse:
     def changes(self, speed_mps: float) -> Complex:
         """What the gain from road to reading, at ``WAVE_NUMBERS_CPM``, changes by for each of the cars that it may be
         instead, as a share of its own (o, n). Where the gain is nothing that may be any number; speeds as ``power``."""
-        key = round(log(speed_mps) * _SPEEDS_PER_E)
+        key = round(log(speed_mps) * SPEEDS_PER_E)
         if key not in self._changes:
-            f_hz = WAVE_NUMBERS_CPM * exp(key / _SPEEDS_PER_E)
-            own, *others = (one.gain(f_hz) for one in self._axles)
-            self._changes[key] = np.array([other / own - 1 for other in others]).reshape(-1, len(f_hz))
+            speed_mps = exp(key / SPEEDS_PER_E)
+            own, *others = (one.response(WAVE_NUMBERS_CPM * speed_mps, speed_mps) for one in (self._car, *self._off))
+            self._changes[key] = np.array([other / own - 1 for other in others]).reshape(-1, len(own))
         return self._changes[key]
 
     def changed_power(self, speed_mps: float) -> Array:
         """Mean square of what the gain from road to reading changes by, at ``WAVE_NUMBERS_CPM`` (n,) [1/s4]."""
         return np.asarray(self.power(speed_mps) * (np.abs(self.changes(speed_mps)) ** 2).sum(axis=0))
-
-    @cached_property
-    def _axles(self) -> list[_Axles]:
-        """Its own axles, and those of the cars that it may be instead."""
-        return [_Axles(one) for one in (self._car, *self._off)]
-
-
-class _Axles:
-    """How a car answers the road under each axle, looked up in a table over frequency: delays and contact patch, which
-    turn quickly with the wave number, are put in at each speed."""
-
-    def __init__(self, car: LinearCar) -> None:
-        structure = car.structure
-        behind_m, axle = np.unique(structure.behind_m, return_inverse=True)
-        by_wheel = car.by_wheel(_TABLE_HZ)
-        self._by_axle = [by_wheel[:, axle == one].sum(axis=1) for one in range(len(behind_m))]
-        self._shift = (np.exp(-2j * np.pi * behind_m[:, None] * WAVE_NUMBERS_CPM)
-                       * np.sinc(WAVE_NUMBERS_CPM * structure.contact_patch_m))
-
-    def gain(self, f_hz: Array) -> Complex:
-        """From the road under the front axle to the reading (n,) [1/s2], ``f_hz`` (n,) at ``WAVE_NUMBERS_CPM``."""
-        at = np.log(f_hz)
-        looked_up = [np.interp(at, _LOG_TABLE_HZ, one) for one in self._by_axle]
-        return np.asarray(sum(one * shift for one, shift in zip(looked_up, self._shift, strict=True)))
 
 
 @dataclass(frozen=True)

@@ -24,14 +24,13 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.arrays import Array, Bools
+from logger.dsp.resample import PASS_OF_RATE
 
 BLOCK_S = 4.0
 """Bodies bounce at 1 to 2 Hz with 0.2 of critical damping and more: half a hertz of resolution (1.5 / BLOCK_S) shows
 it; and a road of 20 to 40 m in town, 100 m outside, has about one level."""
 LOWEST_HZ, HIGHEST_HZ = 0.75, 30.0
 """Below it a driver brakes and turns; above it a car with wheels at 10 to 15 Hz passes next to nothing."""
-PASSED = 0.38
-"""Share of the rate up to which recorders are flat."""
 SLOWEST_MPS = 3.0
 STEADY = 0.1
 """Standard deviation of the speed in a block as a share of it: the wheelbase's interference fades by what is known of
@@ -95,7 +94,7 @@ def bands() -> tuple[tuple[int, int], ...]:
     """First bin and the one behind the last of each band; bins are 1 / BLOCK_S apart."""
     found, first = [], round(LOWEST_HZ * BLOCK_S)
     while first <= HIGHEST_HZ * BLOCK_S:
-        end = first + max(1, round(_WIDENING * first - 0.06 * 4.0 * BLOCK_S + 0.5))
+        end = first + max(1, round(_WIDENING * (first - 4.0 * BLOCK_S) + 0.5))
         found.append((first, end))
         first = end
     return tuple(found)
@@ -161,7 +160,7 @@ def _blocks(accel_mps2: Array, speed_mps: Array, usable: Bools, rate_hz: float, 
     scale = 2 / (rate_hz * float(taper @ taper))
     firsts = np.array([first for first, _ in bands()])
     last = bands()[-1][1]
-    passes = middles_hz() + counts() / (2 * BLOCK_S) <= min(PASSED * rate_hz, passed_hz)
+    passes = middles_hz() + counts() / (2 * BLOCK_S) <= min(PASS_OF_RATE * rate_hz, passed_hz)
     kept = [(np.empty(0), np.empty(0), np.empty(0), np.empty((0, len(firsts))))]
     for some in np.split(begins, range(_AT_ONCE, len(begins), _AT_ONCE)):
         rows = some[:, None] + np.arange(length)

@@ -38,7 +38,8 @@ from logger.roads.iri import PER_KM
 from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.linearise import KnownCar
 
-_SPACING_M = 0.05
+FINE_M = 0.05
+"""Steps in which the Golden Car's slope is followed, nearly: a window is a whole number of them [m]."""
 _FORGOTTEN_M = 400.0  # the slope has no memory of what lies so far behind
 
 
@@ -67,7 +68,7 @@ class ErrorBound:
     def __init__(self, car: KnownCar, sensor: Sensor, window_m: float) -> None:
         self._car = car
         self._variance = sensor.variance_mps2_2
-        self._lags = ceil(window_m / _SPACING_M)
+        self._lags = ceil(window_m / FINE_M)
         spacing_m = window_m / self._lags
         self._count = 1 << (ceil((window_m + _FORGOTTEN_M) / spacing_m) - 1).bit_length()
         self._wave_number_cpm = np.asarray(np.fft.rfftfreq(self._count, spacing_m), dtype=np.float64)

@@ -29,8 +29,8 @@ from logger.estimation.road_spectrum import RoadSpectrum
 from logger.roads.iri import PER_KM
 
 _SLOPE_POWER = np.abs(golden_car_slope(WAVE_NUMBERS_CPM)) ** 2 * WAVE_NUMBER_STEPS_CPM
-_NODES = np.array([-sqrt(3), 0.0, sqrt(3)])  # Gauss-Hermite, in standard errors of the log level
-_NODE_WEIGHTS = np.array([1, 4, 1]) / 6
+_NODES, _NODE_WEIGHTS = np.polynomial.hermite_e.hermegauss(3)  # in standard errors of the log level
+_NODE_WEIGHTS /= _NODE_WEIGHTS.sum()
 _FORGOTTEN_M = 40.0
 _RISES = np.linspace(-12.0, 12.0, 33)
 

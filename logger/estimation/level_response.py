@@ -21,10 +21,11 @@ from logger.arrays import Array, Complex
 from logger.estimation.quantisation import GaussianReadings
 from logger.estimation.road_solver import Block
 from logger.estimation.roughness import resolved_shares
+from logger.estimation.scored_variances import BLOCK_SHARE
 
 RISE = 0.4  # of the log level, by 22 % of an IRI: about a standard error of it where steps hide a road
 _FOLLOWED_SAMPLES = 600  # the newest, whose bounds have gone through fewer than four blocks
-_TAKEN_OVER = 0.2  # of a new curvature, every 4 s: over the 20 s of a block
+RAISED_EVERY = 2  # blocks: how bounds answer a level changes slowly, and a block is a round dearer for it
 _LEAST_CURVATURE = 0.15  # of the expected one: a third of it where readings toggle about one edge
 _MOST_CHANGE = 0.5  # of a precision at once, so that one is left
 
@@ -95,6 +96,7 @@ class LevelResponse:
         counted = answer.seen * (np.arange(block.count) < block.point_at(-_FOLLOWED_SAMPLES))
         slope, expected = answer.slope(counted)
         fresh = np.array([(slope - raised.slope(counted)[0]) / RISE, expected])
-        self._curvatures = (1 - _TAKEN_OVER) * self._curvatures + _TAKEN_OVER * fresh
+        share = RAISED_EVERY * BLOCK_SHARE
+        self._curvatures = (1 - share) * self._curvatures + share * fresh
         if self._curvatures[1] > 0:
             self.curvature = max(float(self._curvatures[0] / self._curvatures[1]), _LEAST_CURVATURE)

@@ -15,10 +15,11 @@ import numpy as np
 
 from logger.arrays import Array, Complex
 from logger.estimation.car_response import HIGHEST_HZ, SteadyMotion
+from logger.estimation.scored_variances import BLOCK_SHARE
 
 _BAND_HZ = 0.25
 _LOWEST_HZ = 2.0  # below, drift and braking are no road's either
-_TAKEN_OVER, _FIRST_TAKEN_OVER = 0.1, 0.25  # of a new periodogram: a block begins 2 s behind the one before
+_FIRST_TAKEN_OVER = 0.25  # of a new periodogram
 # Smoothed so, white readings have periodograms of some 27 degrees of freedom: more than this comes by chance in one
 # band of 3e7 (chi-squared), in some hundred hours of driving, and is then next to nothing.
 _ABOVE = 3.2
@@ -98,7 +99,7 @@ class OtherMotion:
         taper[span[0]:span[-1] + 1] = np.hanning(int(span[-1] - span[0]) + 1)
         fresh = np.abs(np.fft.rfft(weight * residual_mps2 * taper)) ** 2 / float(weight @ taper**2)
         before = np.ones(len(fresh)) if self._power is None else self._power
-        share = max(1 / (1 / _FIRST_TAKEN_OVER + self._heard), _TAKEN_OVER)
+        share = max(1 / (1 / _FIRST_TAKEN_OVER + self._heard), BLOCK_SHARE)
         self._power, self._heard = (1 - share) * before + share * fresh, self._heard + 1
         width = 2 * round(_BAND_HZ * count / self._rate_hz / 2) + 1
         smooth = np.convolve(self._power, np.full(width, 1 / width), mode="same")

@@ -27,7 +27,6 @@ from logger.estimation.sensor_noise import Sensor
 _KEPT = 0.3  # of the last round, so that rounds do not overshoot
 _TRIALS = 12
 _EVENING_ROUNDS, _NEARLY_EVEN = 6, 0.01
-_LEAST_OTHERS = 1e-3  # of an even reading's information
 _LEAST_WAY = 0.5  # of a step in that, which would not end otherwise
 _LEAST_SLOPE = 1e-6  # of others with even readings, where no reading says anything of another
 # In readings that say the same: wide enough to be a mean, and short beside the ringing of a lone bump. By dense algebra
@@ -80,7 +79,7 @@ def cavity(motion: SteadyMotion, variance: Array) -> tuple[Array, Array]:
     precision = 1 / variance
     trials, log_trials = _trials(variance)
     # 1 / remaining - 1 / trial: what even readings say of an acceleration less what its own one does
-    log_others = log_trials - np.log(np.maximum(1 / motion.resolved_per_reading(trials) - 1, _LEAST_OTHERS))
+    log_others = log_trials - np.log(1 / motion.resolved_per_reading(trials) - 1)
     log_others += _LEAST_SLOPE * log_trials
     covariance = motion.covariance_left(1 / float(precision.mean()))
     alike = (covariance / covariance[0]) ** 2

@@ -70,7 +70,6 @@ STRENGTHS = tuple(product((0.03, 0.06, 0.12, 0.24), (1e-4, 3e-3, 3e-2), (0.05, 0
 _USUAL = (0.12, 3e-3, 0.15, 9.0)
 _FREEDOM = 4.0
 _ROUNDS = 3
-_GUESSED_S = 0.15
 _SEEN = 25.0
 _NEAR = 3
 
@@ -135,6 +134,11 @@ class CarriedDelay:
     delay_s: float
     std_s: float
     drives: int = 0
+
+
+UNKNOWN = CarriedDelay(0.14, 0.07)
+"""Before anything was learnt: receivers are late by 0.05 to 0.3 s. Mean and deviation of what is as likely from each
+value to twice that."""
 
 
 @dataclass(frozen=True)
@@ -355,7 +359,7 @@ def _profile(a: Array, b: Array, gravity: Array) -> tuple[Array, Array]:
 def _best(a: Array, b: Array, gravity: Array, is_learnt: bool) -> tuple[int, Array]:
     """Index of the best delay and its w; while little has been driven, of a usual delay."""
     explained, w = _profile(a, b, gravity)
-    index = int(np.argmax(explained)) if is_learnt else int(np.argmin(np.abs(DELAYS_S - _GUESSED_S)))
+    index = int(np.argmax(explained)) if is_learnt else int(np.argmin(np.abs(DELAYS_S - UNKNOWN.delay_s)))
     return index, w[index]
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from logger.arrays import Array, Bools, Complex
 from logger.estimation.car_response import SteadyMotion, steady_motion
 from logger.estimation.iri_posterior import vehicle_error_variance
-from logger.estimation.level_response import RISE, Answer, LevelResponse
+from logger.estimation.level_response import RAISED_EVERY, RISE, Answer, LevelResponse
 from logger.estimation.other_motion import OtherMotion
 from logger.estimation.quantisation import (
     GaussianReadings,
@@ -53,7 +53,6 @@ _COARSE_ROUNDS, _COARSE_STEPS = 2, 2
 # level moves by less than changes an IRI by 3 %, and the variances of bounds by less than 3 % (r.m.s.). Nowhere else do
 # these move. With rounds counted, not measured, sections at 20 to 30 mph that steps hide read 11 to 14 % too smooth.
 _MORE_ROUNDS, _LEVEL_RESTS, _BOUNDS_REST = 10, 0.06, 0.03
-_RAISED_EVERY = 2  # blocks: how bounds answer a level changes slowly, and a block is a round dearer for it
 _MOST_DEVIATIONS = 3.0
 _LEAST_SHOWN = 1e-3
 _SMOOTHEST_SOLVED = -6.0  # an IRI of 0.12: a bump on a smoother road takes more steps of the solver
@@ -260,7 +259,7 @@ class FollowedRoad:
             if done >= rounds and self._roughness.moved < _LEVEL_RESTS and self._bounds_moved < _BOUNDS_REST:
                 break
         self._blocks += is_last
-        if self._answer is not None and is_last and before is not None and self._blocks % _RAISED_EVERY == 0:
+        if self._answer is not None and is_last and before is not None and self._blocks % RAISED_EVERY == 0:
             raised = begun_with._raised_from(block, self._answer)
             raised._round(block, samples, read, seen, steps, before, False, False, beyond_mps2, beyond_variance)
             assert raised._answer is not None

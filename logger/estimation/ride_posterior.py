@@ -186,6 +186,5 @@ def _deviation(knows: RideKnowledge, unread: Bools) -> Array:
 def _rough_log_std(accel_variance: float, sensor: Sensor) -> float:
     """Share by which a ride may be off because noise and ride blur the steps little: how rough the road is and where
     gravity lies within a step are then hard to distinguish, and the propagation of bounds is rough."""
-    noise_steps = sensor.noise_rms_mps2 / sensor.step_mps2
-    blur_steps = sqrt(accel_variance + sensor.noise_rms_mps2**2) / sensor.step_mps2
-    return _ROUGH_SHARE / (noise_steps * blur_steps)
+    noise_mps2 = sensor.noise_rms_mps2
+    return _ROUGH_SHARE * sensor.step_mps2**2 / (noise_mps2 * sqrt(accel_variance + noise_mps2**2))

@@ -36,9 +36,10 @@ import numpy.typing as npt
 from logger.arrays import Array, Complex
 from logger.dsp.filters import frequency_response
 from logger.dsp.weightings.wk import WEIGHTING
+from logger.estimation.error_bound import FINE_M
 from logger.estimation.road_spectrum import COMMON_ROAD
 from logger.roads import iso8608
-from logger.roads.iri import PER_KM, golden_car_sections
+from logger.roads.iri import PER_KM, TIRE_BASE_M, golden_car_sections
 from logger.units import MPH_MPS, WINDOW_M
 from logger.vehicle.linearise import KnownCar
 from logger.vehicle.vehicle import Vehicle, with_load
@@ -49,12 +50,8 @@ ROADS = 120
 PASSENGER_KG = 75.0
 LEAST_WINDOW_M, MOST_WINDOW_M = 2.0, 200.0
 
-METHOD = 1  # another number whenever the same settings give other results
-
 _ROAD_M = 1000.0
-_SPACING_M = 0.05  # nearly: a window is a whole number of steps
 _EVEN_WAVES = 400  # of a road, log-spaced; 5000 of them change no ratio by more than 0.01 %
-_TIRE_SAMPLES = 5  # the 250 mm of the IRI
 _WITHIN = 68.0  # percentage of roads within one standard error
 # A quarter car has one of four wheels under it, a half car one side of the body.
 _SHARE_OF_LOAD = {"quarter_car": 0.25, "half_car": 0.5, "full_car": 1.0}
@@ -204,7 +201,7 @@ class _Roads:
     """
 
     def __init__(self, settings: CalibrationSettings) -> None:
-        per_window = round(settings.window_m / _SPACING_M)
+        per_window = round(settings.window_m / FINE_M)
         self._windows = round(settings.road_m / settings.window_m)
         self._samples = self._windows * per_window
         spacing_m = settings.window_m / per_window
@@ -238,7 +235,7 @@ class _Roads:
 
 def _golden_car_response(wave_number: Array, spacing_m: float) -> Complex:
     """Slope of the suspension per elevation [1/m] of the IRI's car on a profile of samples: see ``rectified_slope``."""
-    base_m = _TIRE_SAMPLES * spacing_m
+    base_m = round(TIRE_BASE_M / spacing_m) * spacing_m
     slope = (np.exp(2j * np.pi * wave_number * base_m) - 1) / base_m
     return slope * frequency_response(golden_car_sections(spacing_m), wave_number, 1 / spacing_m)
 

@@ -260,7 +260,8 @@ class Block:
         slowest = self._speed_class.min()
         by_class = np.bincount(self._speed_class[moving] - slowest, weight[moving])
         found = np.flatnonzero(by_class)
-        total = by_class[found] @ self.grid.car.powers(np.exp((slowest + found) / _SPEED_CLASSES_PER_E).tolist())
+        powers = [self.car.power(speed_mps) for speed_mps in np.exp((slowest + found) / _SPEED_CLASSES_PER_E).tolist()]
+        total = by_class[found] @ np.array(powers).reshape(len(found), len(WAVE_NUMBERS_CPM))
         gain: Array = np.interp(self._waves.log_n, _LOG_WAVE_NUMBERS, np.sqrt(total), right=0.0) ** 2
         return gain / max(self.seen_points(weight > 0), 1)
 

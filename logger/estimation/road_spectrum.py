@@ -23,7 +23,7 @@ FLATTENED_BELOW_CPM = 0.01
 
 # Of level and waviness: what roads are like (half of them between 1.1 and 5.7 m/km; wavinesses of 1.8 to 2.5 are
 # common, ISO 8608, annex C), and how far both may have wandered since the last stretch.
-_COMMON_DEVIATIONS, _STEP_DEVIATIONS = (1.8, 0.3), (0.3, 0.1)
+COMMON_DEVIATIONS, _STEP_DEVIATIONS = (1.8, 0.3), (0.3, 0.1)
 _WAVINESS_RANGE = (1.2, 3.2)
 
 
@@ -84,7 +84,7 @@ def learnt(
     slopes = np.stack([np.ones(len(power)), -log_waves[used]])
     gradient = slopes @ (power - seen_share * resolved)
     curvature = (slopes * (seen_share * resolved**2)) @ slopes.T
-    for centre, deviations in ((COMMON_ROAD, _COMMON_DEVIATIONS), (before, _STEP_DEVIATIONS)):
+    for centre, deviations in ((COMMON_ROAD, COMMON_DEVIATIONS), (before, _STEP_DEVIATIONS)):
         if centre is not None:
             precision = np.array(deviations) ** -2.0
             gradient -= precision * [now.log_level - centre.log_level, now.waviness - centre.waviness]

@@ -28,11 +28,11 @@ from functools import cached_property, lru_cache
 import numpy as np
 
 from logger.arrays import Array, Bools, Complex
+from logger.estimation.road_spectrum import COMMON_DEVIATIONS
 from logger.estimation.scored_variances import FORGOTTEN, LARGEST_STEP, ScoredVariances
 
 LENGTHS_M = np.array([10.0, 100.0, 10_000.0])
-# Of the log variance, before a road is known: half of all roads between 1.1 and 5.7 m/km make the last.
-_COMMON_VARIANCES, _LONGEST_VARIANCE = np.array([0.05, 0.15]), 1.8**2
+_COMMON_VARIANCES = np.array([0.05, 0.15])  # of the log variance, before a road is known; the last is that of levels
 _VARIANCE_LOG_STD = 1.5  # by how much roads differ in that
 _SMOOTHEST, _ROUGHEST = -12.0, 8.0  # L of roads that have an IRI of 0.006 and 140 m/km
 _CELL_M = 8.0
@@ -119,7 +119,7 @@ class RoadLevels:
     @property
     def variances(self) -> Array:
         """Of L, what each process of ``LENGTHS_M`` makes of it, as learnt."""
-        return np.append(self._scored.values, _LONGEST_VARIANCE)
+        return np.append(self._scored.values, COMMON_DEVIATIONS[0] ** 2)
 
     def held_at(self, log_variance: Array) -> RoadLevels:
         """The same road with this log variance (n,), point by point of one block, which stays."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from logger.arrays import Array
 
-_BLOCK_SHARE = 0.1  # of a block of 20 s is new
+BLOCK_SHARE = 0.1  # of a block of 20 s is new
 FORGOTTEN = 0.02
 """Of what was heard of a drive, per block: it is known from the last 100 s."""
 LARGEST_STEP = 0.7
@@ -27,7 +27,7 @@ class ScoredVariances:
     def learn(self, slope: Array, curvature: Array) -> None:
         """One step, by slope and expected curvature (k,) of a block's log evidence in the logarithms."""
         logs = np.log(self.values)
-        self._curvature = (1 - FORGOTTEN) * self._curvature + _BLOCK_SHARE * curvature
+        self._curvature = (1 - FORGOTTEN) * self._curvature + BLOCK_SHARE * curvature
         pulled_back = FORGOTTEN * self._precision * (logs - self._common_logs)
-        step = (_BLOCK_SHARE * slope - pulled_back) / (self._curvature + self._precision)
+        step = (BLOCK_SHARE * slope - pulled_back) / (self._curvature + self._precision)
         self.values = np.exp(logs + np.clip(step, -LARGEST_STEP, LARGEST_STEP))

@@ -28,6 +28,7 @@ from math import exp, hypot, log, sqrt
 import numpy as np
 
 from logger.arrays import Array
+from logger.dsp.resample import GRID_RATE_HZ, PASS_OF_RATE
 from logger.estimation.normal_distribution import probability_between
 from logger.estimation.scored_variances import LARGEST_STEP
 
@@ -57,8 +58,6 @@ are all that tells how much noise there is; were they no less probable with less
 # Of readings that are not coarse, block by block: how far the noise is from the sensor's.
 _NOISE_DEVIATION = 0.5
 _LEAST_LOG_NOISE = -2.0  # a sensor that hangs must not be taken for one without noise
-_BAND_SHARE = 0.76  # recorders are flat to 38 of 50 Hz
-_SECOND = 100
 
 
 @dataclass(frozen=True)
@@ -285,16 +284,17 @@ def noise_slope(residual_mps2: Array, weight: Array, resolved_waves: float) -> t
 
     Only what recorders pass is looked at: noise that was thinned out to 100 Hz has nothing above.
     """
+    band_share, second = 2 * PASS_OF_RATE, GRID_RATE_HZ  # of half the rate; its samples
     waves = np.fft.rfft(residual_mps2 * (weight > 0))
-    waves[int(len(waves) * _BAND_SHARE):] = 0.0
+    waves[int(len(waves) * band_share):] = 0.0
     in_band = weight * np.fft.irfft(waves, len(weight)) ** 2
-    seconds = len(weight) // _SECOND
-    sums = in_band[-seconds * _SECOND:].reshape(seconds, _SECOND).sum(axis=1)
-    counts = (weight[-seconds * _SECOND:] > 0).reshape(seconds, _SECOND).sum(axis=1)
-    if not (counts > _SECOND // 2).any():
+    seconds = len(weight) // second
+    sums = in_band[-seconds * second:].reshape(seconds, second).sum(axis=1)
+    counts = (weight[-seconds * second:] > 0).reshape(seconds, second).sum(axis=1)
+    if not (counts > second // 2).any():
         return 0.0, 0.0
-    typical = float(np.median((sums / np.maximum(counts, 1))[counts > _SECOND // 2]))
-    in_band_count = _BAND_SHARE * float(np.count_nonzero(weight))
+    typical = float(np.median((sums / np.maximum(counts, 1))[counts > second // 2]))
+    in_band_count = band_share * float(np.count_nonzero(weight))
     free = max(in_band_count - resolved_waves, 1.0)
-    excess = typical * in_band_count / (_BAND_SHARE * free) - 1
+    excess = typical * in_band_count / (band_share * free) - 1
     return 0.5 * free * excess, free

@@ -12,8 +12,9 @@ from functools import lru_cache
 import numpy as np
 
 from logger.arrays import Array, Bools, Complex
+from logger.dsp.resample import GRID_RATE_HZ
 
-RATE_HZ = 100.0
+RATE_HZ = float(GRID_RATE_HZ)
 SLOWEST_MPS = 1.0
 
 

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from drivers.readings import AccelerationBlock, Fix
 from logger.bounds import MOVING_MPS
 from logger.dsp.repeated_samples import LEAST_SHARE, are_fresh, find_repeats, fresh_samples
-from logger.estimation.drive_alignment import DriveAlignment
+from logger.estimation.drive_alignment import DEVIATIONS, DriveAlignment
 from logger.geodesy import apart_m
 from logger.service.timebase import Timebase, TimedFix
 from logger.units import US_PER_S
@@ -193,7 +193,6 @@ STEP_M = 25.0  # of either way: a chord of it over a curve of 25 m radius is 4 %
 SHARE = 0.08  # a speed that is 4 % off, and chords that are 4 % short
 PLACE_M = 8.0  # between 4 m in the open and 15 m among houses, as the town drives of the bench have them
 SPEED_MPS = 0.1  # usual of receivers, each fix by itself
-DEVIATIONS = 5.0  # 4 raise no false alarm in 10 h of town either: a margin of one
 WORST = 2
 FEWEST_STEPS = 5
 JUMP_M = 100.0  # among houses the places of a standing car move by some tens of metres

@@ -22,7 +22,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from drivers.disk import FileSystem
 from logger.estimation.drive_alignment import DriveAlignment, heading_deg
-from logger.estimation.receiver_delay import CarriedDelay, combined
+from logger.estimation.receiver_delay import UNKNOWN, CarriedDelay, combined
 from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.files import STATE_BYTES
 from logger.printable import counted
@@ -37,9 +37,6 @@ if TYPE_CHECKING:
 SAVE_EVERY_US = 120 * US_PER_S
 LEAST_STD_SHARE = 1e-3
 """No drive tells the noise better; a smaller standard error is no logger's, and its density has no logarithm."""
-UNKNOWN = CarriedDelay(0.14, 0.07)
-"""Before anything was learnt: receivers are late by 0.05 to 0.3 s. Mean and deviation of what is as likely from each
-value to twice that."""
 MOST_DELAY_S = 2.0
 _MOST_DRIVES = 10**9
 _OF = "of"

@@ -15,10 +15,10 @@ from drivers.dump import Event
 from drivers.errors import BadReply, DeviceError, SettingsLost, Unforeseen, as_device_error
 from drivers.sources import Source
 from logger.service.status import SensorState
+from logger.store.log.log_writer import LONGEST_WAIT_US
 from logger.units import US_PER_S
 
 FIRST_WAIT_US = US_PER_S // 2
-LONGEST_WAIT_US = 30 * US_PER_S
 SILENT_AFTER_US = 5 * US_PER_S
 FAULTS_IN_A_ROW = 5
 FAULTY_US = 300_000

@@ -12,13 +12,13 @@ import pytest
 from drivers.accelerometers.bma220 import Bma220Config
 from drivers.dump import DumpHeader, Event, open_dump
 from logger.errors import BadInput
+from logger.estimation.receiver_delay import UNKNOWN
 from logger.estimation.sensor_noise import NoiseBelief
 from logger.service import wiring
 from logger.service.config import AUTO, AccelerometerConfig, Config, load_config
 from logger.service.learning import (
     DELAY,
     NOISE,
-    UNKNOWN,
     KnownNoise,
     NoiseLearning,
     noise_at_start,

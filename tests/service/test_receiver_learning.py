@@ -12,10 +12,10 @@ from drivers.disk import FileSystem
 from drivers.dump import DumpHeader, open_dump
 from logger.errors import BadInput
 from logger.estimation.drive_alignment import DriveAlignment
-from logger.estimation.receiver_delay import CarriedDelay, DelayEstimate
+from logger.estimation.receiver_delay import UNKNOWN, CarriedDelay, DelayEstimate
 from logger.service import wiring
 from logger.service.config import Config, GpsConfig
-from logger.service.learning import DELAY, SAVE_EVERY_US, UNKNOWN, ReceiverLearning, delay_at_start, read_delay
+from logger.service.learning import DELAY, SAVE_EVERY_US, ReceiverLearning, delay_at_start, read_delay
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_model
 

@@ -27,7 +27,7 @@ import yaml
 
 from logger.arrays import Array
 from logger.errors import BadInput
-from logger.estimation.rms_calibration import METHOD, CalibrationSettings, RmsLine, SpeedCalibration
+from logger.estimation.rms_calibration import CalibrationSettings, RmsLine, SpeedCalibration
 from logger.files import STATE_BYTES, json_sha256, make_folder, read_bounded, replace_bytes, write_text
 from logger.printable import LONGEST_COMPLAINT, LONGEST_WORD, word
 from logger.shipped import shipped
@@ -481,7 +481,7 @@ def _number(value: float) -> float:
     return int(plain) if plain.is_integer() else plain
 
 
-FORMAT = 1
+FORMAT = 1  # another number whenever the same settings give other results
 KEPT = 16  # the oldest goes first
 
 _GAIN_PROBES_HZ = np.geomspace(0.01, 100.0, 200)
@@ -497,8 +497,7 @@ class StoredCalibration:
 
 def fingerprint(vehicle: Vehicle, recorder_gain: Callable[[Array], Array] | None, settings: CalibrationSettings,
                 effects: Sequence[Chosen] = ()) -> str:
-    """64 hex digits that change with any number of the vehicle, its effects, the recorder's response, the settings or
-    the method.
+    """64 hex digits that change with any number of the vehicle, its effects, the recorder's response or the settings.
 
     Not with the vehicle's name. The recorder's gain is given by its values at 0.01 to 100 Hz.
     """
@@ -507,8 +506,7 @@ def fingerprint(vehicle: Vehicle, recorder_gain: Callable[[Array], Array] | None
     del numbers["name"], numbers["preload_n"]  # a car has none
     gain = recorder_gain(_GAIN_PROBES_HZ).round(digits).tolist() if recorder_gain else None
     with_effects = {"effects": {one.effect.name: dict(one.values) for one in effects}} if effects else {}
-    return json_sha256({"method": METHOD, "vehicle": numbers, "settings": asdict(settings), "recorder_gain": gain,
-                        **with_effects})
+    return json_sha256({"vehicle": numbers, "settings": asdict(settings), "recorder_gain": gain, **with_effects})
 
 
 def places(vehicle_path: Path) -> tuple[Path, ...]:

@@ -13,10 +13,9 @@ from drivers.disk import FileSystem
 from drivers.dump import DumpHeader, DumpWriter, Event, intact_bytes
 from logger.store.log import atomic_file
 from logger.store.log.log_name import OwnFile
-from logger.units import US_PER_S
+from logger.store.log.log_writer import LONGEST_WAIT_US
 
 ENDING = ".dump.gz"
-RETRY_US = 60 * US_PER_S
 log = logging.getLogger(__name__)
 
 
@@ -118,7 +117,7 @@ class DumpRecording:
         if why != self.trouble:
             log.error("recording stopped: %s", why)
         self.trouble = why
-        self._retry_us = self._now_us() + RETRY_US
+        self._retry_us = self._now_us() + LONGEST_WAIT_US
 
 
 def repair_recordings(directory: Path, files: FileSystem, warn: atomic_file.Warn = atomic_file.warn_in_journal) -> None:

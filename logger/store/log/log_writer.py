@@ -243,6 +243,7 @@ WAITING_ROWS = 5000
 
 FIRST_WAIT_US = US_PER_S
 LONGEST_WAIT_US = 30 * US_PER_S
+"""After so long at the latest what has failed is tried again: a disk, a sensor, a receiver."""
 log = logging.getLogger(__name__)
 
 
