@@ -87,7 +87,7 @@ class Node:
 
     content is the text of a scalar as written, a tuple of nodes, or a dict from key to node (in the file's
     order). ``plain`` distinguishes an unquoted scalar (``12``, ``true``) from a quoted one (``"12"``). ``key`` is what
-    it stands under in the file; empty: it is the whole, or one of a list.
+    it stands under in the file; empty: it is the whole, or one of a list. ``otherwise``: a word that may stand here.
     Each asking method raises the reader's own error (``complaint``) when the value is something else.
 
     Problem: an instrument's settings belong into its own file, but how a wrong value is refused belongs to the program
@@ -100,6 +100,7 @@ class Node:
     content: str | tuple[Self, ...] | Mapping[str, Self]
     plain: bool = False
     key: str = ""
+    otherwise: str = ""
 
     def complaint(self, words: str) -> Exception:
         """The error to raise here: ``file:line: <words>``."""
@@ -112,7 +113,8 @@ class Node:
     def wrong(self, expected: str) -> Exception:
         """The error for this node: ``file:line: expected <expected>, found <what stands there> [for <key>]``."""
         key = f" for {shortened(self.key)}" if self.key else ""
-        return self.complaint(f"expected {expected}, found {self._shown()}{key}")
+        word = f"{self.otherwise} or " if self.otherwise and isinstance(self.content, str) else ""
+        return self.complaint(f"expected {word}{expected}, found {self._shown()}{key}")
 
     def _shown(self) -> str:
         if isinstance(self.content, str):

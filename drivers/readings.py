@@ -1,9 +1,10 @@
-"""What goes between a wire and a user: bytes, readings, words of recordings that are believed, settings."""
+"""What goes between a wire and a user: bytes, readings, words of recordings that are believed, and kinds of settings,
+each of which reads its value from a node of a settings file (``drivers.plain_yaml``)."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -169,6 +170,9 @@ class Whole:
     low: int
     high: int
 
+    def read(self, node: Node) -> int:
+        return node.integer(self.low, self.high)
+
 
 @dataclass(frozen=True)
 class Decimal:
@@ -177,6 +181,9 @@ class Decimal:
     low: float
     high: float
 
+    def read(self, node: Node) -> float:
+        return node.number(self.low, self.high)
+
 
 @dataclass(frozen=True)
 class OneOf:
@@ -184,15 +191,24 @@ class OneOf:
 
     numbers: tuple[int, ...]
 
+    def read(self, node: Node) -> int:
+        return int(node.choice(*map(str, self.numbers)))
+
 
 @dataclass(frozen=True)
 class Flag:
     """``true`` or ``false``."""
 
+    def read(self, node: Node) -> bool:
+        return node.boolean()
+
 
 @dataclass(frozen=True)
 class Text:
     """Any text that is not empty."""
+
+    def read(self, node: Node) -> str:
+        return node.text()
 
 
 @dataclass(frozen=True)
@@ -209,6 +225,11 @@ class OrNone:
 
     word: str
     kind: Whole | Decimal | OneOf | Flag | Text | Special
+
+    def read(self, node: Node) -> Any:
+        if node.is_null() if self.word == "null" else node.content == self.word:
+            return None
+        return self.kind.read(replace(node, otherwise=self.word))
 
 
 Kind = Whole | Decimal | OneOf | Flag | Text | Special | OrNone

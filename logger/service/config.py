@@ -19,7 +19,7 @@ from drivers.accelerometers import DEFAULT, accelerometers
 from drivers.accelerometers.accelerometer import Accelerometer
 from drivers.errors import SettingsError
 from drivers.nmea import GPS_BEGAN, ROLLOVERS_MAX
-from drivers.readings import BAUDS, Decimal, Flag, Kind, OneOf, OrNone, Special, Text, Whole
+from drivers.readings import BAUDS, Decimal, OrNone, Whole
 from logger.errors import BadInput
 from logger.shipped import shipped, vehicle_file, vehicle_path
 from logger.store.export.sticks import MODES, NOT_PAIRED, Pairing
@@ -53,32 +53,9 @@ def _section(kind: type[Section], readers: Mapping[str, Read] | None = None) -> 
     return read
 
 
-def _number(low: float, high: float) -> Read:
-    return lambda node: node.number(low, high)
-
-
-def _whole(low: int, high: int) -> Read:
-    return lambda node: node.integer(low, high)
-
-
-def _or_none(word: str, read: Read) -> Read:
-    """Let ``word`` stand for None (``null``: any way YAML has to write nothing)."""
-    def read_or_none(node: Node) -> Any:
-        nothing = node.is_null() if word == "null" else node.content == word
-        if nothing:
-            return None
-        if not isinstance(node.content, str):
-            return read(node)
-        try:
-            return read(node)
-        except BadInput as error:
-            raise BadInput(str(error).replace("expected ", f"expected {word} or ", 1)) from None
-    return read_or_none
-
-
 def _noise(node: Node) -> float | str:
     """A noise, or ``AUTO``; ``null``, as earlier versions shipped, says nothing."""
-    noise = None if node.is_null() else _or_none(AUTO, _number(LEAST_NOISE_MPS2, MOST_NOISE_MPS2))(node)
+    noise = None if node.is_null() else OrNone(AUTO, Decimal(LEAST_NOISE_MPS2, MOST_NOISE_MPS2)).read(node)
     return AUTO if noise is None else float(noise)
 
 
@@ -99,28 +76,8 @@ def _vehicle(node: Node) -> Path:
     return path
 
 
-def _reader(kind: Kind) -> Read:
-    """How a declared kind of setting is read."""
-    match kind:
-        case Whole(low, high):
-            return _whole(low, high)
-        case Decimal(low, high):
-            return _number(low, high)
-        case OneOf(numbers):
-            words = tuple(map(str, numbers))
-            return lambda node: int(node.choice(*words))
-        case Flag():
-            return Node.boolean
-        case Text():
-            return Node.text
-        case Special(read):
-            return read
-        case OrNone(word, inner):
-            return _or_none(word, _reader(inner))
-
-
 def _section_of(accelerometer: Accelerometer[Any]) -> Read:
-    read = _section(accelerometer.settings, {key: _reader(kind) for key, kind in accelerometer.keys.items()})
+    read = _section(accelerometer.settings, {key: kind.read for key, kind in accelerometer.keys.items()})
 
     def read_checked(node: Node) -> Any:
         try:
@@ -196,25 +153,25 @@ class GpsConfig:
     places are that it gives from one window to another (standard deviation)."""
 
     port: str = _setting("/dev/serial0", Node.text)
-    baud: int = _setting(9600, _reader(BAUDS))
-    latency_s: float | None = _setting(None, _or_none("auto", _number(0, 2)))
-    bridge_s: float = _setting(10.0, _number(0, 60))
-    week_rollovers: int = _setting(0, _whole(0, ROLLOVERS_MAX))
+    baud: int = _setting(9600, BAUDS.read)
+    latency_s: float | None = _setting(None, OrNone("auto", Decimal(0, 2)).read)
+    bridge_s: float = _setting(10.0, Decimal(0, 60).read)
+    week_rollovers: int = _setting(0, Whole(0, ROLLOVERS_MAX).read)
     earliest_date: str = _setting("2026-01-01", _date)
-    antenna_behind_front_axle_m: float = _setting(0.0, _number(-3, 15))
-    place_std_m: float = _setting(1.0, _number(0, 100))
+    antenna_behind_front_axle_m: float = _setting(0.0, Decimal(-3, 15).read)
+    place_std_m: float = _setting(1.0, Decimal(0, 100).read)
 
 
 @dataclass(frozen=True)
 class PipelineConfig:
     """``low_pass_hz`` None: no low-pass before the roughness relation; ``arithmetic`` is float or fixed."""
 
-    window_m: float = _setting(WINDOW_M, _number(1, 1000))
-    low_pass_hz: float | None = _setting(None, _or_none("null", _number(1, 45)))
-    slow_mps: float = _setting(4.5, _number(0.1, 50))
-    stationary_mps: float = _setting(0.5, _number(0.05, 5))
-    drive_end_s: float = _setting(300.0, _number(10, 86400))
-    blind_window_s: float = _setting(5.0, _number(1, 60))
+    window_m: float = _setting(WINDOW_M, Decimal(1, 1000).read)
+    low_pass_hz: float | None = _setting(None, OrNone("null", Decimal(1, 45)).read)
+    slow_mps: float = _setting(4.5, Decimal(0.1, 50).read)
+    stationary_mps: float = _setting(0.5, Decimal(0.05, 5).read)
+    drive_end_s: float = _setting(300.0, Decimal(10, 86400).read)
+    blind_window_s: float = _setting(5.0, Decimal(1, 60).read)
     arithmetic: str = _setting("float", lambda node: node.choice("float", "fixed"))
 
 
@@ -232,11 +189,11 @@ class LogConfig:
     """Where the logs go, when a file is full, how long a row may stay off the disk, and the room that may be used."""
 
     directory: Path = _setting(Path("/var/lib/ridelog"), Node.path)
-    max_file_bytes: int = _setting(4_000_000, _whole(10_000, 1_000_000_000))
+    max_file_bytes: int = _setting(4_000_000, Whole(10_000, 1_000_000_000).read)
     record_dump: bool = _setting(False, Node.boolean)
-    sync_s: float = _setting(1.0, _number(0.1, 60))
-    quota_bytes: int | None = _setting(None, _or_none("null", _whole(200_000_000, 10**15)))
-    keep_free_bytes: int = _setting(200_000_000, _whole(0, 10**15))
+    sync_s: float = _setting(1.0, Decimal(0.1, 60).read)
+    quota_bytes: int | None = _setting(None, OrNone("null", Whole(200_000_000, 10**15)).read)
+    keep_free_bytes: int = _setting(200_000_000, Whole(0, 10**15).read)
 
 
 _pairing = _section(Pairing, {"mode": lambda node: node.choice(*MODES), "key_file": Node.path})
@@ -250,9 +207,9 @@ class Config:
     accelerometer: AccelerometerConfig = field(default_factory=AccelerometerConfig, metadata={"read": _accelerometer})
     gps: GpsConfig = _setting(GpsConfig(), _section(GpsConfig))
     vehicle: Path = field(default_factory=lambda: vehicle_file(GENERIC), metadata={"read": _vehicle})
-    wheelbase_m: float | None = _setting(None, _or_none("null", _number(*WHEELBASES_M)))
-    mass_kg: float | None = _setting(None, _or_none("null", _number(*MASSES_KG)))
-    vehicle_error: float = _setting(0.05, _number(0, 1))
+    wheelbase_m: float | None = _setting(None, OrNone("null", Decimal(*WHEELBASES_M)).read)
+    mass_kg: float | None = _setting(None, OrNone("null", Decimal(*MASSES_KG)).read)
+    vehicle_error: float = _setting(0.05, Decimal(0, 1).read)
     pipeline: PipelineConfig = _setting(PipelineConfig(), _pipeline)
     log: LogConfig = _setting(LogConfig(), _section(LogConfig))
     pairing: Pairing = _setting(NOT_PAIRED, _pairing)
