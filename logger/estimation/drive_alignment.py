@@ -48,7 +48,6 @@ DEVIATIONS = 5.0
 raise no false alarm in 10 h of town: a margin of one."""
 LEAST_GRAVITY_MPS2 = 1.0
 """A sensor that feels less is dead, and says nothing of how it sits."""
-TINY_MPS2 = 1e-12
 
 
 @dataclass(frozen=True)
@@ -65,7 +64,7 @@ class Sitting:
 def sitting(means: Array, forward: Array | None, forward_std_rad: float | None) -> Sitting:
     """Of blocks with mean readings (n, 3), n at least 2."""
     gravity = means.mean(axis=0)
-    size = max(float(np.linalg.norm(gravity)), TINY_MPS2)
+    size = float(np.linalg.norm(gravity)) or 1.0
     up = gravity / size
     across = means - np.outer(means @ up, up)
     error = float(np.sqrt(np.sum((across - across.mean(axis=0)) ** 2) / (len(means) - 1) / len(means)))

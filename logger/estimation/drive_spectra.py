@@ -45,7 +45,6 @@ DRIVE_SPECTRA = "drive_spectra"
 """In a sidecar: what is kept of the drives of a session so that their car can be learnt of them."""
 MOST_KEPT = 256
 """Blocks of a drive in its sidecar: some 8 kB. Nine minutes of steady driving know a car to a few per cent."""
-_WAITING_HALVES = 32  # half blocks: a minute of samples
 _FORM, _FLOOR = 1, 1e-8  # of what is kept; the least power [m2/s4 per Hz], 25 dB below the noise of the finest sensor
 
 INDEPENDENT = 1 / (1 + 2 * ((2 / 3) ** 2 + (1 / 6) ** 2)) / (1 + 2 * (1 / 6) ** 2)
@@ -204,7 +203,7 @@ class SpectraKeeper:
     def push(self, accel_mps2: Array, speed_mps: Array, usable: Bools) -> None:
         """Samples (n,) that follow those before."""
         self._waiting.append((accel_mps2, speed_mps, usable))
-        if sum(len(one) for one, _, _ in self._waiting) >= _WAITING_HALVES * self._half:
+        if sum(len(one) for one, _, _ in self._waiting) >= 2 * self._half:
             self._take(keep=self._half)
 
     def break_off(self) -> None:

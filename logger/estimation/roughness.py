@@ -42,7 +42,6 @@ _COMMON = 4.0  # points, before the scatter is known, and never fewer
 _MOST_COMMON = 100.0  # w keeps within 14 %, which costs nothing
 _LEAST_OF_MEAN = 0.1  # a place that shows less says nothing of the scatter
 _TAKEN_OVER = 0.6  # of a new scale, so that it does not overshoot
-_SMALLEST_LOG, _LARGEST_LOG = -3.0, 16.0  # of w
 _LEAST_INFORMATION = 1e-9
 _TABLE_STEP = 0.5
 _CLASSES = 8
@@ -194,7 +193,7 @@ class RoadLevels:
         if learns:
             self._learn_scatter(power, weight, gain * np.exp(float(seen @ strength / seen.sum())), seen > 0)
         fresh = np.log((self._common + power) / (self._common + weight))
-        fresh = np.clip(_TAKEN_OVER * fresh + (1 - _TAKEN_OVER) * (log_before - level), _SMALLEST_LOG, _LARGEST_LOG)
+        fresh = _TAKEN_OVER * fresh + (1 - _TAKEN_OVER) * (log_before - level)
         self._first, self._log_scale = first, np.where(near > _LEAST_INFORMATION, fresh, 0.0)
         self._scale_error = 2 / (self._common + weight)
         self._excess = 0.5 * self._scale_error * (weight - self._common) / (weight + self._common)

@@ -23,6 +23,7 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 
 from drivers.dump import Event
+from drivers.sources import GATHER_S, SCATTER_S
 from logger.service.event_core import EventCore
 from logger.service.storage import Storage
 from logger.service.supervisor import Supervisor
@@ -152,7 +153,7 @@ class Player:
 
 
 LOOP_S = 0.5
-HOLD_BACK_US = 60_000
+HOLD_BACK_US = round((GATHER_S + SCATTER_S) * US_PER_S)
 THREAD_SWITCH_S = 0.0005
 
 

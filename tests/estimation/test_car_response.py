@@ -38,13 +38,14 @@ def test_power_is_that_of_the_car_at_a_steady_speed(name: str, speed_mps: float)
     assert not found[WAVE_NUMBERS_CPM * speed_mps > HIGHEST_HZ * 1.03].any()
 
 
-def test_powers_side_by_side_are_those_one_after_the_other() -> None:
+def test_speeds_that_are_alike_share_a_response_and_others_do_not_change_it() -> None:
     car = structure_of(read_vehicle(vehicle_file("rav4-2009")))
     one, other = (CarResponse(LinearCar(car, body_point(car, 0.7))) for _ in range(2))
-    one.power(17.0)
-    speeds_mps = [17.0, 5.0, 17.2, 30.0]
-    assert one.powers(speeds_mps) == pytest.approx(np.array([other.power(speed) for speed in speeds_mps]), rel=1e-12)
-    assert one.powers([]).shape == (0, len(WAVE_NUMBERS_CPM))
+    first = one.power(17.0)
+    for speed_mps in (5.0, 30.0):
+        assert one.power(speed_mps) == pytest.approx(other.power(speed_mps), rel=1e-12)
+    assert one.power(17.2) is first
+    assert first == pytest.approx(other.power(17.0), rel=1e-12)
 
 
 def test_a_full_car_has_one_response_per_axle() -> None:
