@@ -701,6 +701,20 @@ def test_a_record_follows_its_force_though_the_vehicles_mode_lies_elsewhere(
 
 
 @pytest.mark.slow
+def test_a_short_record_follows_its_force_though_its_mode_moves_with_amplitude(tmp_path: Path) -> None:
+    """Eight seconds of a spring that hardens, and that is half as stiff in the file; then under another force."""
+    count, bench, push = round(8.0 * RATE_HZ), Bench(0.8, 2000.0, 3.0, 4e7), noise(30.0, 8.0, 4)
+    seen = {"displacement_m": bench.moved(NOTHING, push, NOTHING)["displacement_m"][:count]}
+    (tmp_path / "bench.yaml").write_text(replace(bench, spring=1000.0).yaml)
+    right, wrong = (str(written(tmp_path / name, seen, {"force_n": force(TIME_S)[:count]}, BODY))
+                    for name, force in (("right", push), ("wrong", noise(30.0, 8.0, 5))))
+    vehicle = str(tmp_path / "bench.yaml")
+    assert main(["compare", "--vehicle", vehicle, right]) == 0
+    with pytest.raises(BadInput, match="is it another run's excitation"):
+        main(["compare", "--vehicle", vehicle, wrong])
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(("read", "pushed", "words"), [
     (1 / 9.80665, 1.0, r"0\.10\d times .* it looks like accel_z_mps2 in g \("),
     (1.0, 1e-3, r"found accel_z_mps2 9\d\d times .* it looks like accel_z_mps2 in mm/s2 or force_n in kN \("),

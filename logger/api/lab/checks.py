@@ -25,9 +25,9 @@ from logger.errors import BadInput
 from logger.lab.another_car import AnotherCar, LikeliestRig, another_car, error_with_best_effect, likeliest_rig
 from logger.lab.likelihood.lag import SLOWEST_MPS
 from logger.lab.likelihood.priors import Tolerance
-from logger.lab.likelihood.whittle import BLOCK_S, HIGHEST_OF_RATE, LOWEST_HZ
+from logger.lab.likelihood.whittle import BLOCK_S, HIGHEST_OF_RATE
 from logger.lab.residuals.breakdown import ModelResiduals
-from logger.lab.residuals.road_coherence import coherence_with_road
+from logger.lab.residuals.road_coherence import chance_of_following
 from logger.lab.road_match import (
     RoadMatch,
     below_bounce_band_hz,
@@ -107,7 +107,7 @@ def check_model(word: str, model: CarModel, runs: SimulatedRuns, warn: Callable[
     # One after the other: whether it is the car is asked of runs that are right, and takes seconds.
     _say(chain(_other_ways_up(runs, followed), _other_units(runs, followed),
                _other_units_on_rig(runs, rig), _other_units_of_signals(runs, predictions),
-               _other_roads(runs, followed, car, rig),
+               _other_roads(runs, followed, car),
                _another_car(word, model, runs, predictions, known, tolerance.largest)), warn, anyway)
     return predictions
 
@@ -133,7 +133,7 @@ def check_roads(word: str, model: CarModel, runs: SimulatedRuns, warn: Callable[
     as ``check_model``: all that can be asked where the vehicle's numbers may be far off."""
     car, predictions = compose(model.vehicle, model.effects), predicted(word, model, runs, model.effects)
     rig = _likeliest_rig(model, runs, predictions, Tolerance.of(model.known).widened())
-    _say(chain(_other_units_on_rig(runs, rig), _other_roads(runs, _followed(runs, predictions, car), car, rig)), warn,
+    _say(chain(_other_units_on_rig(runs, rig), _other_roads(runs, _followed(runs, predictions, car), car)), warn,
          anyway)
 
 
@@ -268,27 +268,26 @@ def _other_units_of_signals(runs: SimulatedRuns, predictions: Sequence[Array]) -
                        f"says: it looks like {unit}")
 
 
-def _other_roads(runs: SimulatedRuns, followed: _Followed, car: Car, rig: LikeliestRig | None) -> Iterator[str]:
-    """Which runs do not follow their road, and where they would fit. What resonates longer than a segment of a spectrum
-    lasts is coherent with nothing: of rigs one that is not refuted has to explain nothing either."""
+def _other_roads(runs: SimulatedRuns, followed: _Followed, car: Car) -> Iterator[str]:
+    """Which runs do not follow their road, and where they would fit."""
     strangers = [k for k, one in enumerate(followed.around) if one.is_refuted]
     if not strangers and followed.around and pool(followed.around).is_refuted:
         strangers = list(range(len(followed.around)))
     for k in strangers:
         found, run = followed.around[k], runs.runs[k]
         # Nothing drives what is let go, and its mode may lie anywhere.
-        if run.past is Past.FREE or (rig is not None and rig.explains[k]) or (run.timed and _is_coherent(run, car)):
+        if run.past is Past.FREE or (run.timed and _follows(run, car, followed.body_hz)):
             continue
         what = "a record that follows its excitation" if run.timed else "a drive that follows the road of its profile"
         yield (f"{run.name}: expected {what}, found one that does not (correlation {found.correlation:.2f} around the "
                f"body bounce; chance gives up to {found.chance:.2f}): {_advice(run, car, followed.band_hz)}")
 
 
-def _is_coherent(run: Run, car: Car) -> bool:
-    """Whether some linear rig follows what drives this one: its own may be off by more than the width of its mode."""
+def _follows(run: Run, car: Car, body_hz: Array) -> bool:
+    """Whether what drives a rig predicts its record, whatever its numbers are: at six samples a period of the fastest
+    bounce that its file may have, the least that tell one from its half."""
     still = ModelResiduals([run], car, [np.zeros(run.count)], [])
-    _, chance = coherence_with_road(still).explained(LOWEST_HZ, still.top_hz)
-    return chance < FALSE_ALARM  # of a run too short to tell it is NaN
+    return chance_of_following(still, 3.0 * bounce_band_hz(body_hz)[1]) < FALSE_ALARM
 
 
 def _another_car(word: str, model: CarModel, runs: SimulatedRuns, predictions: Sequence[Array],

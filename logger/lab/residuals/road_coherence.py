@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from logger.arrays import Array
 from logger.lab.likelihood.whittle import LOWEST_HZ
@@ -21,6 +22,7 @@ from logger.lab.residuals.breakdown import ModelResiduals, frequencies, segments
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Way
 from logger.runs import Run
+from logger.vehicle.simulate import resampled
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,8 +67,7 @@ class Coherence:
 def coherence_with_road(residuals: ModelResiduals) -> Coherence:
     """The coherence of residuals with the road under the wheels that the car has, or with what drives a rig."""
     residual = segments(residuals, residuals.residual)
-    axles_m = np.unique(residuals.car.structure.behind_m)
-    inputs = [_slopes(residuals, one) for one in axles_m] + _forces(residuals)
+    inputs = _inputs(residuals)
     roads = np.stack([segments(residuals, one) for one in inputs], axis=2)
     count = len(residual)
     power = np.mean(np.abs(residual) ** 2, axis=0)
@@ -80,6 +81,36 @@ def coherence_with_road(residuals: ModelResiduals) -> Coherence:
     chance = q / n
     share = np.clip((raw - chance) / (1 - chance), 0.0, 1.0) if n > q else np.zeros_like(raw)
     return Coherence(frequencies(residuals), share, raw, q, n, power)
+
+
+def chance_of_following(residuals: ModelResiduals, rate_hz: float) -> float:
+    """Probability that by chance alone what drives a run, the only one of some residuals, predicts so much of these
+    that their own past does not, of both resampled to about a rate: an F test (C. W. J. Granger, Econometrica 37, 1969,
+    424-438). Unlike coherence it needs no segments that outlast the ringing of a mode, and the frequency of a mode may
+    depend on its amplitude."""
+    from scipy.special import betainc
+
+    factor = max(1, round(residuals.rate_hz / rate_hz))
+    residual, *inputs = (one / max(float(np.linalg.norm(one)), 1e-300) for one in (
+        resampled(samples - samples.mean(), factor) for samples, in [residuals.residual, *_inputs(residuals)]))
+    past = 4 * len(residuals.car.structure.mass)  # two steps for each mode, and as many for the recorder's filter
+    if len(residual) < 2 * past * (2 + len(inputs)):
+        return 1.0
+    own, new = sliding_window_view(residual, past + 1)[:, :past], residual[past:]
+
+    def unpredicted(before: Array) -> tuple[float, int]:
+        """Power of what columns (n, c) do not predict, and their rank."""
+        weights, _, rank, _ = np.linalg.lstsq(before, new)
+        return float(np.sum((new - before @ weights) ** 2)), int(rank)
+
+    alone, few = unpredicted(own)
+    driven, many = unpredicted(np.hstack([own, *(sliding_window_view(one, past + 1) for one in inputs)]))
+    return float(betainc((len(new) - many) / 2, (many - few) / 2, driven / alone)) if many > few else 1.0
+
+
+def _inputs(residuals: ModelResiduals) -> list[list[Array]]:
+    """What drives the runs: the road's slope under each axle, then the forces of a rig."""
+    return [_slopes(residuals, one) for one in np.unique(residuals.car.structure.behind_m)] + _forces(residuals)
 
 
 def _slopes(residuals: ModelResiduals, behind_m: float) -> list[Array]:
