@@ -190,26 +190,21 @@ def changed_input(road: RoadInput, values: Mapping[str, float], run: int) -> Roa
     return road
 
 
-def free_input(
-    road: RoadInput, name: str, start: float | None = None, bounds: tuple[float, float] | None = None
-) -> Free:
+def free_input(road: RoadInput, name: str, start: float | None = None) -> Free:
     """A free number of a road's input: from its present value, unless something else is said.
 
     Heights stay within a factor of 20 and keep their sign, widths within 4, the scale of speed within 1.5, places
-    within 5 m. ValueError as ``read_input`` and ``Free``, and for bounds that a size cannot have.
+    within 5 m. ValueError as ``read_input`` and ``Free``.
     """
     value = read_input(road, name)
     value = value if start is None else start
     leaf = name.rpartition(".")[2]
     if leaf == "start_m":
-        low, high = bounds or (value - _PLACE_M, value + _PLACE_M)
-        return Free(name, value, low, high, place=True, weakest=_WEAKEST_PLACE)
+        return Free(name, value, value - _PLACE_M, value + _PLACE_M, place=True, weakest=_WEAKEST_PLACE)
     factor = {"height_m": _HEIGHT_FACTOR, "width_m": _WIDTH_FACTOR, SPEED_SCALE: _SPEED_FACTOR}[leaf]
     most = {"height_m": LARGEST_HEIGHT_M, "width_m": LARGEST_WIDTH_M, SPEED_SCALE: np.inf}[leaf]
     far = float(np.sign(value)) * min(abs(value) * factor, most)
-    low, high = bounds or sorted((value / factor, far))
-    if not (low * high > 0 and max(abs(low), abs(high)) <= most):
-        raise ValueError(f"{name}: expected bounds of one sign, within {most:g}, found {low:g} to {high:g}")
+    low, high = sorted((value / factor, far))
     return Free(name, value, low, high, weakest=_WEAKEST_SPEED if leaf == SPEED_SCALE else WEAKEST)
 
 

@@ -309,20 +309,15 @@ def free_parameter_named(effects: Sequence[Chosen], name: str) -> FreeParameter 
     return free[leaf]
 
 
-def free_number(effects: Sequence[Chosen], free: FreeParameter, start: float | None = None,
-                bounds: tuple[float, float] | None = None) -> Free:
-    """A free parameter as ``identification`` fits it: from its present value, within its range, unless others are
-    given. ValueError as ``Free``, and for bounds beyond its range."""
+def free_number(effects: Sequence[Chosen], free: FreeParameter, start: float | None = None) -> Free:
+    """A free parameter as ``identification`` fits it: from its present value, unless another is given, within its
+    range. ValueError as ``Free``."""
     one = effects[free.effect]
     parameter = one.effect.parameters[free.parameter]
     name = f"{one.effect.name}.{parameter.name}"
     value = one.values[parameter.name] if start is None else start
-    low, high = bounds or (parameter.low, parameter.high)
-    if not parameter.low <= low < high <= parameter.high:
-        raise ValueError(f"{name}: expected bounds within {parameter.low:g} to {parameter.high:g}, found {low:g} to "
-                         f"{high:g}")
     usual = (abs(value) or parameter.usual_range()) if parameter.scale is Scale.LINEAR else None
-    return Free(name, value, low, high, usual=usual)
+    return Free(name, value, parameter.low, parameter.high, usual=usual)
 
 
 def slope_of(parameter: Parameter, value: float) -> float:

@@ -329,8 +329,9 @@ def test_a_part_alone_on_its_bench_answers_as_its_equation_says(tmp_path: Path) 
     assert ridelog.compare(tmp_path / "part.yaml", [run]).error < 0.02
     ridelog.write_run(tmp_path / "again", ridelog.read_run(run))
     assert (tmp_path / "again" / "excitation.csv").read_text().startswith("t_s,displacement_m\n")
-    found = ridelog.identify(tmp_path / "part.yaml", tmp_path / "again", ["damping_n_s_per_m", "preload_n", "mass_kg"],
-                             start={"damping_n_s_per_m": 60.0, "preload_n": -5.0, "mass_kg": 3.0})
+    part = ridelog.read_vehicle(tmp_path / "part.yaml").with_numbers(
+        {"damping_n_s_per_m": 60.0, "preload_n": -5.0, "mass_kg": 3.0})
+    found = ridelog.identify(part, tmp_path / "again", ["damping_n_s_per_m", "preload_n", "mass_kg"])
     assert list(found.parameters.values()) == pytest.approx([90.0, 12.0, 2.0], rel=0.01)
     ridelog.write_vehicle(tmp_path / "found.yaml", found.model)
     assert ridelog.read_vehicle(tmp_path / "found.yaml").vehicle == found.model.vehicle

@@ -231,7 +231,7 @@ def _on_measured_roads(given: Model, records: list[Record], question: IdentifyQu
     """The fit over roads that are known, but for a few numbers. BadInput and ``NotIdentifiable`` as ``identify``."""
     word = word_of(question.vehicle, given)
     known = given.known if question.free is None else {}
-    question = _with_unknown_numbers(given, word, records, question)
+    question = _with_unknown_numbers(given, word, question)
     _check_effects(given, word, records, question)
     _check_rigs(records, question)
     if not question.obstacles:
@@ -263,8 +263,7 @@ def _on_measured_roads(given: Model, records: list[Record], question: IdentifyQu
         tuple(_in_words_of(records, one) for one in doubts(fit, *checks)))
 
 
-def _with_unknown_numbers(given: vehicle_file.CarModel, word: str, records: Sequence[Record],
-                          question: IdentifyQuestion) -> IdentifyQuestion:
+def _with_unknown_numbers(given: vehicle_file.CarModel, word: str, question: IdentifyQuestion) -> IdentifyQuestion:
     """The question with those numbers free as well that the vehicle's file calls unknown; where none is named, all that
     it does not know exactly, those of its effects too, but for what an effect has by default. BadInput where it knows
     all."""
@@ -278,11 +277,13 @@ def _with_unknown_numbers(given: vehicle_file.CarModel, word: str, records: Sequ
     if not free and question.free is None:
         raise question.wrong("free", f": expected the parameters to find, as {word} gives all of them exactly (or "
                                      "write 875 +- 5%, or unknown, for one in the file)")
-    bounds = {name: one.ends for name, one in known.items() if name in free and one.ends} | dict(question.bounds or {})
-    if PRELOAD in free:  # as large as what was measured, either way
-        most_n = max(float(np.abs(record.measured_mps2).max()) for record in records)
-        bounds = {PRELOAD: (-2 * most_n, 2 * most_n)} | bounds
-    return replace(question, free=free, bounds=bounds)
+    return replace(question, free=free)
+
+
+def _ranges(given: vehicle_file.CarModel, records: Sequence[Record]) -> dict[str, tuple[float, float]]:
+    """The ranges that the vehicle's file gives; a preload is at most as large as what was measured, either way."""
+    most_n = 2 * max(float(np.abs(record.measured_mps2).max()) for record in records)
+    return {PRELOAD: (-most_n, most_n)} | {name: one.ends for name, one in given.known.items() if one.ends}
 
 
 def _in_words_of(records: Sequence[Record], line: str) -> str:
@@ -348,33 +349,28 @@ def _drive_model(given: vehicle_file.CarModel, records: list[Record], road: Road
     except ValueError as error:
         obstacle, _, words = str(error).partition(":")
         raise question.wrong("obstacles", f" {obstacle}:{words}") from None
-    parameters = _free(given, road, starts, len(records), question, known)
+    parameters = _free(given, road, starts, records, question, known)
     try:
         return DriveModel(given.vehicle, parameters, records, road, given.effects)
     except ValueError as error:
         raise question.wrong("free", f": {error}") from None
 
 
-def _free(given: vehicle_file.CarModel, road: RoadInput, found: Mapping[str, float], runs: int,
+def _free(given: vehicle_file.CarModel, road: RoadInput, found: Mapping[str, float], records: Sequence[Record],
           question: IdentifyQuestion, known: Mapping[str, Known] = MappingProxyType({})) -> list[Free]:
-    """The free numbers; where an obstacle's start was found and not named, it is one of them. BadInput for names,
-    starts and bounds that do not fit."""
+    """The free numbers; where an obstacle's start was found and not named, it is one of them. BadInput for names that
+    do not fit."""
     free = question.free or ()
     if cars := [name for name in free if name.startswith(f"{EACH}.") and not is_input(name)]:
         raise question.wrong("free", f" {cars[0]}: expected a parameter of the road after {EACH}., as all runs share "
                                      "one car")
-    names = [one for name in free for one in expanded(name, runs)]
+    names = [one for name in free for one in expanded(name, len(records))]
     if not names or len(set(names)) < len(names):
         raise question.wrong("free", f" {','.join(free)}: expected names with commas between them, each once")
     named = {run_and_name(name)[1] for name in names}
     names += [name for name in found if run_and_name(name)[1] not in named]
-    start = {one: value for name, value in (question.start or {}).items() for one in expanded(name, runs)}
-    between = {one: ends for name, ends in (question.bounds or {}).items() for one in expanded(name, runs)}
-    for option, said in (("start", set(start)), ("bounds", set(between))):
-        if unknown := said - set(names):
-            raise question.wrong(option, f" {sorted(unknown)[0]}: expected one of what is free ({', '.join(names)})")
-    first = {run_and_name(name)[1]: place for name, place in reversed(list(found.items()))}
-    start = {**first, **found, **start}
+    start = {**{run_and_name(name)[1]: place for name, place in reversed(list(found.items()))}, **found}
+    between = _ranges(given, records)
     try:
         return [_free_number(given, road, name, start.get(name), between.get(name), known.get(name)) for name in names]
     except ValueError as error:
@@ -386,11 +382,11 @@ def _free_number(given: vehicle_file.CarModel, road: RoadInput, name: str, start
     """A number of the road, of an effect or of the car, with how well it was ``known``. ValueError for one that none of
     them has."""
     if is_input(name):
-        return free_input(road, name, start, between)
+        return free_input(road, name, start)
     if (move := free_parameter_named(given.effects, name)) is not None:
-        return free_number(given.effects, move, start, between)
+        return free_number(given.effects, move)
     prior = (known.value, known.deviation) if known is not None and known.is_guess else None
-    return free(given.vehicle, name, start, between, prior)
+    return free(given.vehicle, name, None, between, prior)
 
 
 def _options(model: DriveModel, question: IdentifyQuestion) -> FitOptions:
@@ -432,7 +428,7 @@ def _on_unmeasured_roads(given: Model, records: list[Record], question: Identify
         drives = drives_of(records)
     except UnusableRun as error:
         raise BadInput(f"{records[error.run].name}: {error}") from None
-    parameters = _free(given, RoadInput(), {}, len(records), question)
+    parameters = _free(given, RoadInput(), {}, records, question)
     try:
         car = AxleResponse(given.vehicle, parameters, drives[0].rate_hz)
     except ValueError as error:
@@ -567,8 +563,8 @@ def _first_lines(fit: Fit | RoadFit, head: str, error: str) -> Iterator[str]:
             + " (at its bound)" * (name in fit.at_bound) for name, value in fit.parameters.items()]
     held = max((count for count in range(1, len(said) + 1) if len(", ".join(said[:count])) <= _LINE), default=1)
     yield (f"{', '.join(said[:held])}{f', and {len(said) - held} more below' * (held < len(said))}" if fit.converged
-           else f"NOT CONVERGED in {fit.iterations} steps: do not use these values; start nearer (--start), or free "
-                "fewer parameters.")
+           else f"NOT CONVERGED in {fit.iterations} steps: do not use these values; give a nearer vehicle file, or "
+                "free fewer parameters.")
     yield head
     yield (f"{f'Converged in {fit.iterations} steps. ' * fit.converged}NRMSE, {error}: {fit.error_before:.4f} before, "
            f"{fit.error_after:.4f} after.")
@@ -672,8 +668,8 @@ def _checks(white: Test, free_of_road: Test) -> Iterator[str]:
 def _measured_limits(fit: Fit, sound: bool) -> Iterator[str]:
     if fit.at_bound:
         yield (f"At a bound: {', '.join(fit.at_bound)}. The bound stopped the fit there; it is not a measured "
-               "value, and its standard error means nothing. Widen --bounds, or run ridelog compare: the model may "
-               "lack an effect.")
+               "value, and its standard error means nothing. Check the vehicle's file, or run ridelog compare: the "
+               "model may lack an effect.")
         if fit.noise.name != "white":
             yield ("Coloured noise can absorb what the model lacks, most of all in a sweep, which has one frequency "
                    "at a time: try --noise white.")

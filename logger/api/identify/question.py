@@ -2,7 +2,6 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
-from math import isfinite
 from pathlib import Path
 from typing import Annotated
 
@@ -12,27 +11,6 @@ from logger.api import shared_fields
 OBSTACLES = {"bump": ("height_m", "width_m"), "step": ("height_m",)}
 """What lies on a road, and its numbers beside ``start_m``."""
 MEASURED, UNMEASURED, SAME = "measured", "unmeasured", "same"
-
-
-def _number(text: str) -> tuple[str, float]:
-    name, values = _numbers(text, 1)
-    return name, values[0]
-
-
-def _interval(text: str) -> tuple[str, tuple[float, float]]:
-    name, values = _numbers(text, 2)
-    return name, (values[0], values[1])
-
-
-def _numbers(text: str, count: int) -> tuple[str, list[float]]:
-    name, _, rest = text.partition("=")
-    try:
-        values = [float(piece) for piece in rest.split(",")]
-    except ValueError:
-        values = []
-    if len(values) != count or not all(map(isfinite, values)):
-        raise ValueError(f"expected PARAM={','.join(['NUMBER'] * count)}")
-    return name, values
 
 
 def _obstacle(text: str) -> tuple[str, dict[str, float]]:
@@ -51,7 +29,10 @@ class IdentifyQuestion(question.LongQuestion):
 
       ridelog identify run --vehicle rav4-2009 --free sprung_mass_kg
       ridelog identify run1 run2 run3 --vehicle mycar.yaml --free sprung_mass_kg,both.suspension_damping_n_s_per_m \\
-          --start sprung_mass_kg=700 --bounds sprung_mass_kg=500,1500 --out fitted.yaml
+          --out fitted.yaml
+
+    A fit starts at the values of the vehicle's file and stays within a factor of 20 of them (3 for lengths), or within
+    the range that the file gives, as [700, 1000].
 
     To free a parameter of an effect in the vehicle's file, put the effect's name before it:
 
@@ -96,12 +77,6 @@ class IdentifyQuestion(question.LongQuestion):
         "with a tolerance, which is its prior, and its effects)", metavar="PARAM,...",
         read=shared_fields.names_of)] = None
     _: KW_ONLY
-    start: Annotated[Mapping[str, float] | None, question.Option(
-        "where to start instead of the vehicle's value; may repeat", metavar="PARAM=VALUE", read=_number,
-        many=dict)] = None
-    bounds: Annotated[Mapping[str, tuple[float, float]] | None, question.Option(
-        "range to search, above 0 for sizes (default: a factor of 20 either way, 3 for lengths); may repeat",
-        metavar="PARAM=LOW,HIGH", read=_interval, many=dict)] = None
     obstacles: Annotated[Mapping[str, Mapping[str, float]] | None, question.Option(
         "what lies on the road [m]; may repeat. bump: height_m, width_m; step, up or with a negative height down: "
         "height_m. Without start_m, identify searches for it; --free takes its parameters as bump.height_m ... In "
