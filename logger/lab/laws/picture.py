@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,14 +11,14 @@ from logger.arrays import Array
 from logger.chart_data import CURVE_POINTS, CURVE_REACH, Curves, Line
 from logger.lab.laws.draft import Draft, LawContext
 from logger.vehicle.effect import Chosen, ForceEffect
-from logger.vehicle.laws import Seen, linear
+from logger.vehicle.laws import MotionLaw, Seen, linear
 from logger.vehicle.uncertain import NumberErrors
 
 _AXES = {"rate": ("rate_mps", "suspension rate [m/s], positive in extension"),
          "travel": ("travel_m", "suspension travel [m], positive in extension"),
          "deflection": ("deflection_m", "tire deflection from rest [m], positive in extension")}
 _STEP = 1e-4  # of a standard error, over which derivatives are taken
-_LOOP_SHARES, _LOOP_HZ, _LOOP_TURNS, _LOOP_STEPS = (0.5, 0.9, 0.99), 1.4, 3, 4000
+_LOOP_SHARES, _LOOP_HZ, _LOOP_TURNS, _LOOP_STEPS = (0.5, 0.9, 0.99), 1.4, 3, 200
 
 
 def picture(draft: Draft, found: Chosen, errors: NumberErrors, context: LawContext) -> Curves | None:
@@ -53,21 +54,30 @@ def _band(draft: Draft, found: Chosen, errors: NumberErrors, at: Array, damping:
 def _loops(draft: Draft, found: Chosen, context: LawContext) -> Curves | None:
     """Force of a law in sinusoidal travel of small and large amplitude, at the frequency of a car's bounce."""
     assert isinstance(draft.effect, ForceEffect)
-    before = linear(context.vehicle.front.suspension_damping_n_s_per_m)
+    before, still = linear(context.vehicle.front.suspension_damping_n_s_per_m), np.zeros(len(Seen._fields) - 3)
     laws = draft.effect.laws(SimpleNamespace(**found.values), before)
-    lines = []
+    lines, time_s = [], np.linspace(0, _LOOP_TURNS / _LOOP_HZ, _LOOP_TURNS * _LOOP_STEPS + 1)
     for way_m in sorted({context.reach("travel_m", share) for share in _LOOP_SHARES}):
-        phase = 2 * np.pi * np.linspace(0, _LOOP_TURNS, _LOOP_TURNS * _LOOP_STEPS + 1)
-        travel, rate = way_m * np.sin(phase), way_m * 2 * np.pi * _LOOP_HZ * np.cos(phase)
+
+        def seen(t: float, memory: Sequence[float], way_m: float = way_m) -> Seen:
+            turn = 2 * np.pi * _LOOP_HZ
+            return Seen._make([way_m * np.sin(turn * t), way_m * turn * np.cos(turn * t), *still, tuple(memory)])
+
+        travel, rate = np.array([seen(t, ())[:2] for t in time_s]).T
         force = sum((one(travel, rate) for one in laws.others), laws.friction_n(rate))
         for law in laws.motions:
-            memory, step_s = np.array(law.memory, dtype=float), 1 / _LOOP_HZ / _LOOP_STEPS
-            still = np.zeros(len(Seen._fields) - 3)
-            for index, (x, v) in enumerate(zip(travel, rate, strict=True)):
-                seen = Seen._make([x, v, *still, tuple(memory)])
-                force[index] += law.force(law.p, seen)
-                if law.rates is not None:
-                    memory = memory + step_s * np.array(law.rates(law.p, seen))
-        last = slice(-_LOOP_STEPS - 1, None, 20)
+            force += [law.force(law.p, seen(t, states))
+                      for t, states in zip(time_s, _remembered(law, seen, time_s), strict=True)]
+        last = slice(-_LOOP_STEPS - 1, None)
         lines.append(Line(f"{1000 * way_m:.3g} mm", travel[last], force[last]))
     return Curves(draft.title, "suspension travel [m], back and forth at body bounce", "force [N]", tuple(lines))
+
+
+def _remembered(law: MotionLaw, seen: Callable[[float, Sequence[float]], Seen], time_s: Array) -> Array:
+    """States (n, k) of a law at times, which may be stiff: it gives over micrometres before it slides."""
+    from scipy.integrate import odeint
+
+    rates = law.rates
+    if rates is None:
+        return np.empty((len(time_s), 0))
+    return np.asarray(odeint(lambda memory, t: rates(law.p, seen(t, memory)), law.memory, time_s))

@@ -14,17 +14,19 @@ from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, hande
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _FUNCTIONS = """
-def force(p, seen):
-    s = seen.memory[0]
-    return p.sliding_force_n * (s - min(max(s, -p.play_m), p.play_m)) / p.yield_travel_m
+def force(p, seen):  # the memory is the spring's stretch over the yield travel
+    z, play = seen.memory[0], p.play_m / p.yield_travel_m
+    return p.sliding_force_n * (z - min(max(z, -play), play))
 
 
 def rates(p, seen):
-    s = seen.memory[0]
-    size = (s - min(max(s, -p.play_m), p.play_m)) / p.yield_travel_m  # the force over that of sliding
+    z, play = seen.memory[0], p.play_m / p.yield_travel_m
+    size = z - min(max(z, -play), play)  # the force over that of sliding
     if size < 0.0:
-        return (seen.rate_mps + p.sliding_rate_m_per_s * (-size * p.lengthening_ratio) ** p.power_ratio,)
-    return (seen.rate_mps - p.sliding_rate_m_per_s * size ** p.power_ratio,)
+        slides_mps = -p.sliding_rate_m_per_s * (-size * p.lengthening_ratio) ** p.power_ratio
+    else:
+        slides_mps = p.sliding_rate_m_per_s * size ** p.power_ratio
+    return ((seen.rate_mps - slides_mps) / p.yield_travel_m,)
 """
 
 

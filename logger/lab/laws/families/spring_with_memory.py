@@ -7,12 +7,15 @@ from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, hande
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _FUNCTIONS = """
+REACH_M = {reach_m!r}  # the memory is how far it has crept, over this
+
+
 def force(p, seen):
-    return p.stiffness_n_per_m * (seen.travel_m - seen.memory[0])
+    return p.stiffness_n_per_m * (seen.travel_m - REACH_M * seen.memory[0])
 
 
 def rates(p, seen):
-    return ((seen.travel_m - seen.memory[0]) / p.creep_time_s,)
+    return ((seen.travel_m / REACH_M - seen.memory[0]) / p.creep_time_s,)
 """
 
 
@@ -31,7 +34,8 @@ class SpringWithMemory(Family):
                       "of the rubber when it has no time to creep"),
             Parameter("creep_time_s", 0.1, 0.005, 5.0, None, Scale.LOG, (0.02, 0.07, 0.25),
                       "in which its force falls to 37 %"))
-        return [self.draft(parameters, handed_on(states=1), _FUNCTIONS, at="loop",
+        functions = _FUNCTIONS.format(reach_m=context.reach("travel_m", 0.9))
+        return [self.draft(parameters, handed_on(states=1), functions, at="loop",
                            title="rubber parallel to the springs that creeps")]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
