@@ -166,6 +166,11 @@ class CornerLaws:
         """With one more force by travel."""
         return replace(self, springs=(*self.springs, law))
 
+    def with_damper(self, law: Law) -> CornerLaws:
+        """With one more force of the damper by its own rate; a mount is in series with that, too."""
+        damper = self.damper
+        return replace(self, damper=lambda rate_mps: damper(rate_mps) + law(rate_mps))
+
     def with_force(self, law: Law2) -> CornerLaws:
         """With one more force by travel and rate."""
         return replace(self, others=(*self.others, law))

@@ -47,7 +47,7 @@ class LawMotion:
 
 
 RATE = LawMotion("rate", "rate", "rate_mps", "m/s", (1.0, "m/s"),
-                 "with_force(lambda travel_m, rate_mps: force_n(p, rate_mps))")
+                 "with_damper(lambda rate_mps: force_n(p, rate_mps))")
 TRAVEL = LawMotion("travel", "travel", "travel_m", "m", (1000.0, "mm"),
                    "with_spring(lambda travel_m: force_n(p, travel_m))")
 DEFLECTION = LawMotion("deflection", "tire's deflection", "deflection_m", "m", (1000.0, "mm"),

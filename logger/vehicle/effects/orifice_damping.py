@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Sought, Values
@@ -24,8 +22,7 @@ class OrificeDamping(ForceEffect):
     sought_last = True
 
     def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
-        size, damper = p.quadratic_damping_n_s2_per_m2, laws.damper
-        return replace(laws, damper=lambda rate_mps: damper(rate_mps) + size * rate_mps * np.abs(rate_mps))
+        return laws.with_damper(lambda rate_mps: p.quadratic_damping_n_s2_per_m2 * rate_mps * np.abs(rate_mps))
 
 
 EFFECT = OrificeDamping()
