@@ -50,7 +50,7 @@ from logger.lab.selection.starts import UnknownNumbers, needs_starts
 from logger.lab.selection.stepwise import MeasuredRoad, Search, SearchEffort, Selection, is_outside_data
 from logger.runs import BY_ROAD, Past, are_on_rig
 from logger.vehicle import named_parameters
-from logger.vehicle.effect import Chosen, Effect, SensorEffect
+from logger.vehicle.effect import Chosen, Effect, ForceEffect, SensorEffect
 from logger.vehicle.named_parameters import free_parameters_of
 
 Progress = Callable[[str], None]
@@ -174,6 +174,11 @@ class LabDiagnosis:
         return self.over_noise > UNEXPLAINED and not self.exceeds_noise
 
     @property
+    def reaches_floor(self) -> bool:
+        """Whether the error on what no fit saw is the noise floor's."""
+        return self.steps[-1].error < (1 + UNEXPLAINED) * self.noise_floor_error
+
+    @property
     def unexplained(self) -> bool:
         """Whether the effects of the verdict, in a car within its priors, do not explain all."""
         return self.exceeds_noise or self.in_conflict
@@ -237,9 +242,25 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
 def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
                    progress: Progress = lambda words: None, effort: SearchEffort | None = None
                    ) -> tuple[Search, Selection]:
-    """The search of a diagnosis and its result; arguments as of ``diagnose``."""
+    """The search of a diagnosis and its result; arguments as of ``diagnose``. Of a part on its bench the forces are
+    sought first. What changes any force, as a sensor or the mass of a fixture does, imitates some of any memory: it is
+    sought where forces leave something, and found where nothing is left with it."""
     search, before = begin_search(posterior, effects, present, progress, effort)
-    return search, search.run(before)
+    forces = [one for one in search.effects if isinstance(one, ForceEffect)]
+    if posterior.vehicle.model != "component" or not forces:
+        return search, search.run(before)
+    by_forces = replace(search, effects=forces)
+    selection = by_forces.run(before)
+    if not exceeds_noise(selection.now):
+        return by_forces, selection
+    wider, more = by_forces.with_more(selection, [one for one in search.effects if one not in forces])
+    return (by_forces, selection) if exceeds_noise(more.now) else (wider, more)
+
+
+def exceeds_noise(model: Baseline) -> bool:
+    """Whether the residual of a model is above the sensor's noise, or a number of the car conflicts with its prior."""
+    return (excess_over_noise(model.posterior, model.state, FALSE_ALARM) > UNEXPLAINED
+            or model.posterior.prior.is_in_conflict(model.state.logs, standard_errors(model.linear).logs))
 
 
 def begin_search(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),

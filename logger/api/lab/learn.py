@@ -186,7 +186,7 @@ def why_none(found: Learning) -> str:
         return "no law learnt: something is missing, but no known effect and no law of these families explains it"
     names = " and ".join(found.verdict)
     many = len(found.verdict) > 1
-    if found.unexplained or (found.diagnosis is not None and found.diagnosis.within_calibration):
+    if found.unexplained or (found.diagnosis is not None and not found.diagnosis.reaches_floor):
         return (f"no law learnt: {names} explain{'s' * (not many)} part of what is missing, and no law of these "
                 "families explains it better")
     return f"no law learnt: {names} explain{'s' * (not many)} the residual"

@@ -14,17 +14,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-from logger.lab.diagnosis import LabDiagnosis, assess, search_effects
+from logger.lab.diagnosis import LabDiagnosis, assess, exceeds_noise, search_effects
 from logger.lab.laws.draft import LEARNED, Draft, Family, LawContext
 from logger.lab.laws.refusals import Nearest, Refusal, known_instead, refusal
-from logger.lab.likelihood.noise_floor import excess_over_noise
 from logger.lab.likelihood.posterior import Posterior, State
-from logger.lab.likelihood.standard_errors import standard_errors
-from logger.lab.likelihood.whittle import UNEXPLAINED
-from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE, min_gain
+from logger.lab.selection.evidence import INDISTINGUISHABLE, min_gain
 from logger.lab.selection.screening import Baseline
 from logger.lab.selection.stepwise import UNTRIED, Search, Selection
-from logger.vehicle.effect import Chosen, Effect
+from logger.vehicle.effect import Chosen, Effect, ForceEffect
 
 Progress = Callable[[str], None]
 
@@ -103,12 +100,6 @@ def learn(posterior: Posterior, effects: Mapping[str, Effect], families: Mapping
     return Learning(law, context, verdict, selection.now.hold_out.error, left, diagnosis, refused)
 
 
-def exceeds_noise(model: Baseline) -> bool:
-    """Whether the residual of a model is above the sensor's noise, or a number of the car conflicts with its prior."""
-    return (excess_over_noise(model.posterior, model.state, FALSE_ALARM) > UNEXPLAINED
-            or model.posterior.prior.is_in_conflict(model.state.logs, standard_errors(model.linear).logs))
-
-
 @dataclass(frozen=True, eq=False)
 class FamilySearch:
     """A search among laws, after one among the known effects.
@@ -148,7 +139,9 @@ class FamilySearch:
         """A model with a law more; None where none says anything."""
         context = LawContext(base.posterior, base.state)
         drafts = {draft.effect: draft for family in self.families.values() if any_family or family.stands_out
-                  for draft in family.drafts(context) if draft.key not in self.refused}
+                  for draft in family.drafts(context) if draft.key not in self.refused
+                  and (family.stands_out or isinstance(draft.effect, ForceEffect)
+                       or context.vehicle.model != "component")}
         self.drafts.update(drafts)
         search = replace(self.search, effects=[*drafts], present=len(base.effects), _promising=set(), _rivals={},
                          effort=replace(self.search.effort, effects=1))
