@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 # Small matrices: a second thread in the algebra library only waits for the first, badly so where tests run in parallel.
 # Set before NumPy is imported, here and in every command that a test starts.
@@ -15,11 +16,9 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 import hypothesis
 import pytest
 
-from logger.shipped import vehicle_file
-from logger.store.formats.vehicle_file import read_vehicle
-
-from .support.drives.short_drive import SHORT_PLAN
-from .support.drives.simulated_drive import DemoDrive, record, simulate_drive
+if TYPE_CHECKING:
+    from .support.drives.replay import Rows
+    from .support.drives.simulated_drive import DemoDrive
 
 # Byte code is kept, of the tests with their asserts and for the commands that they start: to make it again costs each
 # worker 13 s of a processor and each command one.
@@ -83,12 +82,25 @@ def ridelog() -> Path:
 @pytest.fixture(scope="session")
 def short_drive() -> DemoDrive:
     """70 s: standing, a short loss of fix, a halt, a bump."""
-    return simulate_drive(SHORT_PLAN, read_vehicle(vehicle_file("rav4-2009")))
+    # Not above: the process that starts the workers needs none of it, and all of them wait for it.
+    from .support.drives.short_drive import short
+
+    return short()
+
+
+@pytest.fixture(scope="session")
+def short_rows(short_drive: DemoDrive) -> Rows:
+    """What a service makes of it."""
+    from .support.drives.replay import rows_of
+
+    return rows_of(short_drive.header, short_drive.events)
 
 
 @pytest.fixture(scope="session")
 def short_dump(short_drive: DemoDrive, tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The same drive as a recorded dump."""
+    from .support.drives.simulated_drive import record
+
     path = tmp_path_factory.mktemp("drive") / "short.dump.gz"
     record(short_drive, path)
     return path

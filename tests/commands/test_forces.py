@@ -815,7 +815,7 @@ def test_another_unit_of_another_signal_is_said(tmp_path: Path) -> None:
     assert main([*asked, str(runs[1])]) == 0
 
 
-@pytest.mark.parametrize(("damper", "refused"), [("1500 +- 20%", True), ("unknown", False)])
+@pytest.mark.parametrize(("damper", "refused"), [("1500 +- 20%", True), *slow(("unknown", False))])
 def test_a_part_whose_force_is_in_kilonewtons_is_refused_if_its_damper_is_known(
         tmp_path: Path, damper: str, refused: bool) -> None:
     way = noise(8.0, 0.004, 6)

@@ -63,7 +63,7 @@ def test_nothing_is_left_out_and_nothing_is_missing(tmp_path: Path) -> None:
     assert "lacks nothing" in answer["evidence"][0]
 
 
-@pytest.mark.parametrize(("from_m", "repeats"), [(-0.07, True), (-0.04, False)])
+@pytest.mark.parametrize(("from_m", "repeats"), [(-0.07, True), *slow((-0.04, False))])
 def test_what_is_let_go_from_the_same_place_repeats(tmp_path: Path, from_m: float, repeats: bool) -> None:
     runs = decay(tmp_path / "one"), decay(tmp_path / "two", from_m=from_m, seed=4)
     said = called("compare", "--tolerance", "0.5", "--vehicle", tmp_path / "vehicle.yaml", *runs).stdout
@@ -87,7 +87,8 @@ def test_a_mode_that_is_too_sharp_to_be_met_by_chance_is_found(tmp_path: Path) -
     assert found["refitted"]["error"] < 0.05
 
 
-@pytest.mark.parametrize("frequency_hz", [20.0, *slow(170.0, 400.0)])
+@pytest.mark.slow
+@pytest.mark.parametrize("frequency_hz", [20.0, 170.0, 400.0])
 def test_three_periods_of_a_stiff_mass_are_enough(frequency_hz: float, tmp_path: Path) -> None:
     """1 kg with a damping ratio of 3 %, let go 1 mm from its rest, as the textbook has it."""
     w, share = 2 * np.pi * frequency_hz, 0.03

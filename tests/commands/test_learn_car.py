@@ -94,6 +94,7 @@ def test_drives_of_two_cars_are_refused(runs: list[Path], tmp_path: Path) -> Non
     assert "strange: this drive is not from the same car as the others" in found.stderr
 
 
+@pytest.mark.slow
 def test_one_speed_says_what_to_add(tmp_path: Path) -> None:
     runs = written(tmp_path, mixed(CAR, 4, 2 * SECONDS, speeds_mps=(30 * MPH,)))
     found = called("learn-car", *runs, "--wheelbase", 2.66)
@@ -128,6 +129,7 @@ def test_friction_is_named_and_stays_in_the_errors(learned: tuple[dict[str, Any]
     assert learned[0]["effects_missing"] == []
 
 
+@pytest.mark.slow
 def test_uneven_dampers_are_named_with_their_ratio(learned: tuple[dict[str, Any], Path, Path], tmp_path: Path) -> None:
     """By the harmonics of the wheels' hop, of forces that follow by equations of their own."""
     rng = np.random.default_rng(3)

@@ -27,11 +27,6 @@ from ..support.slow import slow
 
 
 @pytest.fixture(scope="module")
-def short_rows(short_drive: DemoDrive) -> Rows:
-    return rows_of(short_drive.header, short_drive.events)
-
-
-@pytest.fixture(scope="module")
 def expected(short_rows: Rows) -> list[str]:
     return short_rows.rows
 

@@ -20,7 +20,7 @@ from logger.vehicle.named_parameters import read, sized
 from logger.vehicle.published_cars import generic_car
 
 from ..support.command import called
-from ..support.drives.replay import rows_of
+from ..support.drives.replay import Rows, rows_of
 from ..support.drives.simulated_drive import DemoDrive
 
 WHEELBASE_M = 2.94  # of the car that the drive was made with
@@ -82,8 +82,8 @@ def test_the_words_say_how_far_off_the_iri_can_be_and_what_to_do() -> None:
     assert "its wheelbase is 2.94 m" in wiring.notices(other, wiring.car_of(other), sensor)[0]
 
 
-def test_a_drive_counts_what_is_not_known_and_its_comfort_stays(short_drive: DemoDrive) -> None:
-    known = rows_of(short_drive.header, short_drive.events).records
+def test_a_drive_counts_what_is_not_known_and_its_comfort_stays(short_drive: DemoDrive, short_rows: Rows) -> None:
+    known = short_rows.records
     header = replace(short_drive.header, vehicle="generic", wheelbase_m=WHEELBASE_M)
     unknown = rows_of(header, short_drive.events).records
     assert unknown == rows_of(header, short_drive.events).records

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from .simulated_drive import DrivePlan, Reception, RoadStretch, SpeedBump
+from logger.shipped import vehicle_file
+from logger.store.formats.vehicle_file import read_vehicle
+
+from .simulated_drive import DemoDrive, DrivePlan, Reception, RoadStretch, SpeedBump, simulate_drive
 
 SHORT_PLAN = DrivePlan(
     speed_knots=((0, 0), (3, 0), (9, 10), (30, 12), (36, 0), (41, 0), (47, 14), (70, 14)),
@@ -11,3 +14,8 @@ SHORT_PLAN = DrivePlan(
     reception=Reception(first_fix_s=6, lost=((20, 24),), corrupted_s=15),
     seed=5,
 )
+
+
+def short() -> DemoDrive:
+    """It, as the RAV4 felt it."""
+    return simulate_drive(SHORT_PLAN, read_vehicle(vehicle_file("rav4-2009")))
