@@ -55,9 +55,10 @@ def begins_unknown(car: Car, run: Run) -> bool:
     return run.past is Past.FREE or car.memories > 0
 
 
-def beginning(car: Car, passage: Passage, run: Run, recorded: Recorded, near: Beginning | None = None) -> Beginning:
+def beginning(car: Car, passage: Passage, run: Run, recorded: Recorded, near: Beginning | None = None,
+              is_bent: bool = True) -> Beginning:
     """The state with which the car's records come nearest to what the run measured; the search for it begins at that of
-    a car that hardly differs (``near``), where there is one.
+    a car that hardly differs (``near``), where there is one. Not ``is_bent``: that of the car without its laws.
 
     Each signal counts by its own size, and its zero is free. Each number of the state has a normal prior about rest:
     that of a motion by what the signals ever were (``_WIDE``), that of a memory is one unit of its law, which for
@@ -74,7 +75,7 @@ def beginning(car: Car, passage: Passage, run: Run, recorded: Recorded, near: Be
     if near is not None and alike and car.bends_laws and len(weighed.measured):
         return _bent_beginning(car, passage, weighed, near, is_near=True)
     plain = _linear_beginning(car, passage, weighed, count)
-    if not car.bends_laws or not len(weighed.measured):
+    if not is_bent or not car.bends_laws or not len(weighed.measured):
         return plain
     return _bent_beginning(car, passage, weighed, plain, is_near=False)
 

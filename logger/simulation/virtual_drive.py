@@ -14,7 +14,7 @@ from logger.arrays import Array
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track, WheelTracks
 from logger.roads.obstacles import OBSTACLES
-from logger.runs import ACCELERATION, SENSOR, Run, Signal, zero_is_known
+from logger.runs import ACCELERATION, SENSOR, Past, Run, Signal, zero_is_known
 from logger.simulation.beginning import Beginning, beginning, begins_unknown
 from logger.vehicle.compose import MOST_MPS2, Car, Response, bounded, fine_outputs, recorded, respond, stepper_of
 from logger.vehicle.models import structure_of
@@ -153,7 +153,8 @@ class SimulatedRuns:
         distance_error_m    distance driven minus distance recorded (n,), per run; None: 0
         rough               half as many steps where that is near enough for differences
         tracks              roads in place of the runs' own; each such object is cached by itself
-        near                how they begin with a car that hardly differs (``beginnings``)
+        near                how they begin with a car that hardly differs (``beginnings``); empty: what was driven, with
+                            the car without its laws, near enough to rank cars
         """
         with np.errstate(over="ignore", invalid="ignore"):
             passages = self._passages_of(car, distance_error_m, rough, tracks, near)
@@ -192,6 +193,9 @@ class SimulatedRuns:
         passages = self._unbegun(car, distance_error_m, rough, tracks)
         if not any(begins_unknown(car, run) for run in self.runs):
             return passages
+        if near is not None and not near and all(run.past is Past.DRIVEN for run in self.runs):
+            return [passage.begun_with(beginning(car, passage, run, _recorded, is_bent=False).state)
+                    if begins_unknown(car, run) else passage for run, passage in zip(self.runs, passages, strict=True)]
         known = near or self.beginnings(car, distance_error_m)
         alike = [near is None and one is passage for one, passage in zip(
             self._unbegun(car, distance_error_m, rough=True), passages, strict=True)]

@@ -82,7 +82,7 @@ class BySquares:
             ) -> tuple[float, State] | None:
         try:
             with np.errstate(all="ignore"):
-                predictions = self.posterior.predict(effects, logs, record, rough=rough)
+                predictions = self.posterior.predict(effects, logs, record, rough, () if rough else None)
                 state = State(tuple(effects), logs, record, size, predictions)
                 deviance = self.deviance(state)
         except NotSimulated:
