@@ -21,7 +21,6 @@ import numpy as np
 from logger.arrays import Array
 from logger.runs import READING, Past, Run
 from logger.vehicle.compose import Car
-from logger.vehicle.modes import modes
 from logger.vehicle.simulate import Passage
 
 Recorded = Callable[[Car, Passage, Run], Array]
@@ -50,8 +49,7 @@ def begins_unknown(car: Car, run: Run) -> bool:
     """Whether the initial state of a run matters: of what nothing drives, of a rig whose record begins in a motion with
     a longer time constant than what is left out of it, or of a part with a memory."""
     if run.past is Past.DRIVEN:
-        return run.begins_in_motion and any(2 * np.pi * one.frequency_hz * one.damping_ratio * run.skip_s < 1
-                                            for one in modes(car.structure))
+        return run.begins_in_motion and car.structure.slowest_decay_per_s * run.skip_s < 1
     return run.past is Past.FREE or car.memories > 0
 
 

@@ -199,6 +199,11 @@ class Structure:
         b = np.vstack([np.zeros_like(self.road), inverse @ self.road])
         return a, b
 
+    @cached_property
+    def slowest_decay_per_s(self) -> float:
+        """By which the slowest of its free motions dies down; 0 of what nothing brings back or slows."""
+        return -float(np.linalg.eigvals(self._state_space[0]).real.max())
+
     def output_matrices(self, outputs: Sequence[Output]) -> tuple[Array, Array]:
         """C (p, 2n) and D (p, u) of y = C x + D z, for p outputs and the state of ``state_space``."""
         n = len(self.mass)
