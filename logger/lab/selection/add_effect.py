@@ -208,7 +208,8 @@ def _best_trial(posterior: Posterior, near: State, nominal: tuple[Chosen, ...]) 
         return None
     by_squares, one = BySquares.of(posterior), nominal[-1]
     cars = (near.logs, posterior.prior.logs(posterior.vehicle, posterior.start_vehicle))
-    trials = [trial for values in one.effect.trials() if (trial := chosen(one.effect, values)).is_plain is one.is_plain]
+    trials = [trial for values in one.effect.trials()
+              if (trial := chosen(one.effect, values, file=one.file)).is_plain is one.is_plain]
     begun = [by_squares.at((*nominal[:-1], trial), logs, near) for trial in trials for logs in cars]
     best = sorted((there for there in begun if there is not None), key=lambda there: there[0])[:3]
     ends = [by_squares.improved(state, 6) for _, state in best]

@@ -9,13 +9,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from logger.api.lab.bench import bench_with
+from logger.api.lab.bench import Bench, bench_with
 from logger.api.lab.question import CompareQuestion
 from logger.commands.main import main
 from logger.lab.laws.draft import LawContext
 from logger.lab.laws.families.sliding_behind_spring import FAMILY
+from logger.lab.selection.add_effect import _best_trial
 from logger.vehicle.compose import compose
-from logger.vehicle.effect import chosen
+from logger.vehicle.effect import Effect, chosen
 
 from ...support.drives.part_bench import Array, fitted_error, force_of, moved, write_bench, write_part
 
@@ -34,17 +35,30 @@ def true_force(place_m: Array, ratio: float, play_m: float, rate_mps: float) -> 
     return force_of(rates, force, 1, place_m)
 
 
-def predicted(folder: Path, place_m: Array, variant: str, values: dict[str, float]) -> tuple[Array, Array, float]:
-    """Forces (n,) of a part with the law, and without it; the rate at which the law has its force."""
+def bench_of(folder: Path, place_m: Array, variant: str) -> tuple[Bench, Effect]:
+    """A part's bench, and a law of the family."""
     vehicle, run = folder / "part.yaml", write_bench(folder / "run", place_m, np.sin(np.arange(len(place_m)) / 9))
     vehicle.write_text(f"name: part\nmodel: component\nstiffness_n_per_m: {STIFFNESS}\n"
                        f"damping_n_s_per_m: {DAMPING}\npreload_n: 0\n")
     bench = bench_with(CompareQuestion(vehicle, run, anyway=True), thin=False)
     posterior = bench.posterior()
-    draft = next(one for one in FAMILY.drafts(LawContext(posterior, posterior.start([]))) if one.variant == variant)
-    law = chosen(draft.effect, draft.effect.usual | values)
+    context = LawContext(posterior, posterior.start([]))
+    return bench, next(one.effect for one in FAMILY.drafts(context) if one.variant == variant)
+
+
+def predicted(folder: Path, place_m: Array, variant: str, values: dict[str, float]) -> tuple[Array, Array, float]:
+    """Forces (n,) of a part with the law, and without it; the rate at which the law has its force."""
+    bench, effect = bench_of(folder, place_m, variant)
+    law = chosen(effect, effect.usual | values)
     found, linear_n = (bench.runs.predict(compose(bench.model.vehicle, some))[0] for some in ([law], []))
     return found, linear_n, law.values["sliding_rate_m_per_s"]
+
+
+def test_the_file_of_a_law_is_kept_where_its_fit_begins_at_another_size(tmp_path: Path) -> None:
+    bench, effect = bench_of(tmp_path, moved(1, 4.0, 0.02, 6.0), "alike")
+    posterior = bench.posterior(searches=True)
+    begun = _best_trial(posterior, posterior.start([]), (chosen(effect, effect.usual, file="law.py"),))
+    assert begun is not None and begun.effects[-1].file == "law.py"
 
 
 def test_what_nobody_knows_of_its_beginning_pulls_no_harder_than_it_slides(tmp_path: Path) -> None:
