@@ -48,7 +48,9 @@ _LEAST_MPS2, _LEAST_SHARE = 1e-6, 1e-6
 _EDGES_HZ = (LOWEST_HZ, 1.0, 1.6, 2.4, 3.4, 4.6, 6.0, 7.5, 9.0, 10.5, 12.0, 13.5, 15.0, 17.0, 19.0, 21.0, 23.0, 25.0,
              27.5, 30.0, 33.5, 37.0)
 # Stretches in which a long run is whitened for the products of its columns; there a whitened sample is made of those of
-# a block before and after it. Measured on runs of 240 s: minus twice the log of the evidence is right within 0.01.
+# a block before and after it. Measured beside the dense Gaussian likelihood (120 s of a car with and without friction),
+# whole or in stretches of 20 to 60 s: standard errors are right within 0.1 %, the log of the determinant within 0.005.
+# Squares of what the ends of a record cut off are 3 to 40 % too large, but hold next to nothing.
 _STRETCH_S = 60.0
 # Shares of the rate between which neither a car nor the recorder's filter leaves anything (``simulate.recorder_gain``).
 _NOISE_BAND_OF_RATE = (0.465, 0.5)

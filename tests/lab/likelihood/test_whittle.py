@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import numpy.typing as npt
 import pytest
+from scipy.linalg import solve_toeplitz
 from scipy.signal import welch
 from scipy.sparse import csr_array, vstack
 
@@ -104,6 +105,36 @@ def test_products_of_sparse_rows_are_those_of_the_whitened_rows_summed_stretch_b
     assert np.abs(found - dense @ dense.T).max() < off * sizes.max() ** 2
     assert np.abs((found - dense @ dense.T) / np.outer(sizes, sizes)).max() < off
     assert np.linalg.eigvalsh(found)[0] > -1e-9 * found.max()
+
+
+@pytest.mark.parametrize("seconds", [50, 190])  # one stretch, and four
+def test_products_and_squares_are_those_of_the_dense_likelihood_of_noise_with_that_spectrum(seconds: int) -> None:
+    """Whittle's likelihood beside the one that it approximates: noise whose spectrum is that of the whitener, and a
+    thousand times as much outside of all bands; its covariance matrix is solved by N. Levinson's recursion. However
+    long a record is, and wherever its stretches end, products of short rows are alike within 0.2 %, squares of those
+    that are as long as the record within 2 %. Only what its own ends cut off is a third too large."""
+    rate_hz = 20.0
+    n = round(seconds * rate_hz)
+    noise, swings, bands = coloured(n), np.sin(0.9 * np.arange(n)) + white(n), Bands(run_of(n, rate_hz, white(n, 3)))
+    whitener = bands.whitener(noise)
+    short = [swings * np.exp(-0.5 * ((np.arange(n) - middle) / 8) ** 2) for middle in range(bands.first, n, 54)]
+    rows = np.vstack([short, np.sum(short, axis=0), swings])
+
+    f_hz = np.fft.rfftfreq(16 * n, 1 / rate_hz)
+    inside = (f_hz >= bands.edges_hz[0]) & (f_hz < bands.edges_hz[-1])
+    middle_hz = 0.5 * (bands.edges_hz[1:] + bands.edges_hz[:-1])
+    spectrum = np.exp(np.interp(f_hz, middle_hz, np.log(bands.levels(noise))))
+    covariance = np.fft.irfft(np.where(inside, spectrum, 1e3 * spectrum.max()))[: n - bands.first]
+    counted = np.vstack([rows, noise])[:, bands.first :]
+    dense = counted @ solve_toeplitz(covariance, counted.T)
+
+    white_rows = whitener(np.vstack([rows, noise]))
+    found = whitener.products(csr_array(np.where(abs(rows) > 1e-9, rows, 0.0)))
+    sizes = np.sqrt(np.diag(dense))
+    off = np.abs((white_rows @ white_rows.T - dense) / np.outer(sizes, sizes))
+    off[:-1, :-1] = np.maximum(off[:-1, :-1], np.abs((found - dense[:-1, :-1]) / np.outer(sizes[:-1], sizes[:-1])))
+    assert off[1:-5, 1:-5].max() < 0.002
+    assert np.diag(off)[-3:].max() < 0.02
 
 
 def test_columns_are_weighed_like_a_residual_and_the_beginning_counts_nowhere() -> None:
