@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from logger.api.lab.question import LAB, LabLoopQuestion, LabQuestion
-from logger.commands.options import asked, declare, help_of, progress, respelled
+from logger.commands.options import asked, declare, help_of, keep_freed_memory, progress, respelled
 from logger.errors import EXIT_DONE, BadInput
 
 if TYPE_CHECKING:
@@ -32,6 +32,7 @@ def run(args: argparse.Namespace) -> int:
     from logger.api.lab.bench import bench_with
     from logger.api.lab.loop import always, unsaid_lines
 
+    keep_freed_memory()
     with respelled(LabLoopQuestion):
         question = asked(LAB, args)
         given = bench_with(question, "ridelog lab")

@@ -3,6 +3,7 @@
 import argparse
 import json
 import pkgutil
+import platform
 import re
 import shlex
 import subprocess
@@ -138,6 +139,19 @@ def test_a_closed_pipe_is_no_traceback() -> None:
         reported = process.stderr.read()
     assert reported == b""
     assert process.returncode == main.EXIT_PIPE_CLOSED
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="of glibc alone")
+def test_memory_that_was_freed_is_kept_for_the_next_arrays() -> None:
+    """Of twenty times six arrays of 750 pages, freed before the next six, the first six have their pages cleared."""
+    command = ("import resource, numpy\n"
+               "from logger.commands.options import keep_freed_memory\n"
+               "keep_freed_memory()\n"
+               "before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt\n"
+               "for _ in range(20): [numpy.ones(384000) for _ in range(6)]\n"
+               "print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)")
+    run = subprocess.run([sys.executable, "-c", command], capture_output=True, text=True, check=True)
+    assert int(run.stdout) < 2 * 6 * 750
 
 
 def test_no_value_is_dropped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
