@@ -49,6 +49,7 @@ from logger.lab.selection.screening import Baseline, Screened, misalignment
 from logger.lab.selection.starts import UnknownNumbers, needs_starts
 from logger.lab.selection.stepwise import MeasuredRoad, Search, SearchEffort, Selection, is_outside_data
 from logger.runs import BY_ROAD, Past, are_on_rig
+from logger.simulation.virtual_drive import steps_hz
 from logger.vehicle import named_parameters
 from logger.vehicle.effect import Chosen, Effect, ForceEffect, SensorEffect
 from logger.vehicle.named_parameters import free_parameters_of
@@ -393,7 +394,8 @@ def _fit_finely(search: Search, selection: Selection) -> tuple[Selection, Linear
     that are not unusually far from doing nothing: they made up for the roughness of the search's simulations (a delay
     beside dry friction, whose force comes part of a step late)."""
     search.progress("fitting it finely")
-    fine = selection.before.posterior.simulated_finely()
+    posterior = selection.before.posterior
+    fine = posterior.simulated(steps_hz(posterior.vehicle))
     while True:
         state = selection.now.state
         start = fine.state_at(state.effects, state.logs, state.record, state.size)

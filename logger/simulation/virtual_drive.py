@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -97,8 +98,8 @@ def recorded_distance(car: Car, distance_m: Array) -> Array:
 
 
 _KEPT_PASSAGES, _KEPT_STEPS = 6, 400_000
-"""Of each run so many passages are kept, of so many steps in all, but two of each: a fit asks for fine and for rough
-ones. Places under wheels take some 80 bytes a step, and a quarter of the time that stepping takes."""
+"""Of each run so many passages are kept, of so many steps in all. Places under wheels take some 80 bytes a step, and a
+quarter of the time that stepping takes."""
 _STEPPERS = 2
 _HOP_HZ = 13.0  # of a car's wheels
 _MOST_FINER = 16
@@ -142,8 +143,11 @@ class SimulatedRuns:
         self._steppers = ThreadPoolExecutor(_STEPPERS)
         self._passages: list[dict[tuple[float, bytes, WheelTracks, bool], Passage]] = [{} for _ in self.runs]
 
-    def __len__(self) -> int:
-        return len(self.runs)
+    def in_steps(self, fine_hz: float) -> SimulatedRuns:
+        """The runs simulated in at least so many steps a second, with the same caches."""
+        found = copy(self)
+        found.fine_hz = fine_hz
+        return found
 
     def predict(self, car: Car, distance_error_m: Sequence[Array] | None = None, rough: bool = False,
                 tracks: Sequence[WheelTracks] | None = None, near: Sequence[Beginning | None] | None = None
@@ -219,7 +223,7 @@ class SimulatedRuns:
                 passage = Passage(track, run.rate_hz, distance, fine_hz, index, is_free)
                 kept = [*({key: passage} | self._passages[index]).items()][:_KEPT_PASSAGES]
                 steps = np.cumsum([len(one.way.distance_m) for _, one in kept])
-                self._passages[index] = dict(kept[: max(2, int(np.searchsorted(steps, _KEPT_STEPS, "right")))])
+                self._passages[index] = dict(kept[: int(np.searchsorted(steps, _KEPT_STEPS, "right"))])
             found.append(passage)
         return found
 

@@ -92,6 +92,15 @@ def test_a_sensor_adds_noise_of_one_seed_and_rounds() -> None:
     assert set(np.unique(as_sensed(still, SensorErrors(0.2, 0.5)))) <= {-1.0, -0.5, 0.0, 0.5, 1.0}
 
 
+def test_runs_in_other_steps_share_what_is_under_the_wheels() -> None:
+    road = Track(0.05, 0.01 * np.sin(0.7 * np.arange(1000)))
+    runs = SimulatedRuns([Run("run", 100.0, np.zeros(400), 0.1 * np.arange(400), np.full(400, 10.0), road)], 500.0)
+    finer = runs.in_steps(1000.0)
+    expected = runs.predict(compose(CAR))
+    assert np.array_equal(finer.predict(compose(CAR), rough=True), expected) and len(runs._passages[0]) == 1
+    assert not np.array_equal(finer.predict(compose(CAR)), expected) and len(runs._passages[0]) == 2
+
+
 def test_a_long_run_keeps_a_few_ways_over_its_road_only() -> None:
     """A fit asks for many ways, millimetres apart: the last ones are kept, but not six of ten minutes."""
     distance_m = 10.0 * np.arange(60_000) / 100.0

@@ -71,7 +71,7 @@ class Bench:
 
         Raises BadInput when the vehicle lacks what it needs.
         """
-        runs = SimulatedRuns(self.runs.runs, fine_hz=SEARCH_HZ) if searches else self.runs
+        runs = self.runs.in_steps(SEARCH_HZ) if searches else self.runs
         model = self.model
         return Posterior(runs, model.given or model.vehicle, self.tolerance, model.vehicle)
 

@@ -161,7 +161,9 @@ class LinearModel:
         self._record_projections = self.record_projections(self.white)
 
     def with_number_slopes(self, numbers: Sequence[Array] | None) -> LinearModel:
-        """The model with other derivatives by the car's numbers (p, n) per run."""
+        """The model with other derivatives by the car's numbers (p, n) per run; itself where it has these."""
+        if numbers is self.numbers:
+            return self
         found = copy(self)
         found._set_number_slopes(numbers)
         return found

@@ -16,7 +16,7 @@ from logger.lab.likelihood.signals import bands_of, deviance
 from logger.profiles.excitation import Excitation
 from logger.runs import normalised_rms_error
 from logger.simulation.beginning import Beginning
-from logger.simulation.virtual_drive import SimulatedRuns, steps_hz
+from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle
@@ -81,14 +81,11 @@ class Posterior:
         return any(signal.measures == "force" for run in self.runs.runs for signal in (run.facts.main, *run.signals)
                    ) or any(isinstance(run.track, Excitation) and run.track.forces for run in self.runs.runs)
 
-    def simulated_finely(self) -> Posterior:
-        """The posterior with runs simulated as finely as what is reported."""
-        return self.simulated(steps_hz(self.vehicle))
-
     def simulated(self, fine_hz: float) -> Posterior:
         """The posterior with runs simulated in so many steps a second."""
-        return Posterior(SimulatedRuns(self.runs.runs, fine_hz), self.vehicle, self.tolerance, self.start_vehicle,
-                         self.prior, self.readings)
+        found = copy(self)
+        found.runs = self.runs.in_steps(fine_hz)
+        return found
 
     def with_free_gains(self) -> Posterior:
         """The posterior with the gains free that fits hold; itself where none is held."""
@@ -104,13 +101,18 @@ class Posterior:
         readings = [one.given(prediction) for one, prediction in zip(self.readings, state.predictions, strict=True)]
         if all(one.rounding_is_noise for one in (*readings, *self.readings)):
             return self
-        return Posterior(self.runs, self.vehicle, self.tolerance, self.start_vehicle, self.prior, readings)
+        return self._with_readings(readings)
 
     def without_rounding(self) -> Posterior:
         """The posterior with all rounding taken as noise."""
         if all(one.rounding_is_noise for one in self.readings):
             return self
-        return Posterior(self.runs, self.vehicle, self.tolerance, self.start_vehicle, self.prior)
+        return self._with_readings(list(map(Readings.of, self.runs.runs)))
+
+    def _with_readings(self, readings: list[Readings]) -> Posterior:
+        found = copy(self)
+        found.readings = readings
+        return found
 
     def car(self, effects: Sequence[Chosen], logs: Array) -> Car:
         """The car with these numbers and effects."""
