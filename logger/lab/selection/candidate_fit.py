@@ -12,7 +12,7 @@ import numpy as np
 
 from logger.lab.likelihood.by_squares import BySquares
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import MapFit, fit, fit_to_the_end, optimise_numbers, relinearise
+from logger.lab.likelihood.map_fit import MapFit, fit, optimise_numbers, relinearise
 from logger.lab.likelihood.posterior import NotSimulated, State
 from logger.lab.selection.evidence import (
     INDISTINGUISHABLE,
@@ -125,11 +125,6 @@ def with_refinements(now: Baseline, name: str) -> Baseline:
     better = refined.gain > plain.gain + INDISTINGUISHABLE and refined.hold_out.explains_most_beyond(plain.hold_out)
     taken = better and not refined.found.state.effects[place].is_refined_too_far
     return Baseline.of(refined.found.linearise()) if taken else now
-
-
-def refine_to_the_end(score: float, one: CandidateFit) -> CandidateFit:
-    """Refine a candidate until nothing is gained."""
-    return CandidateFit.of(score, fit_to_the_end(one.found.linearise(), one.found.numbers))
 
 
 def _rough_fit(score: float, base: Baseline, trial: Trial) -> CandidateFit:
