@@ -175,8 +175,8 @@ class Scales:
     def of(cls, force_n: float, travel_m: float, rate_mps: float) -> Scales:
         """Of r.m.s. values. Those of a car are its bounce with a travel of 2 cm."""
         omega = 2 * np.pi * _BOUNCE_HZ
-        return cls(_power_of_ten(force_n / (_MASS_KG * omega**2 * _TRAVEL_M)), _power_of_ten(travel_m / _TRAVEL_M),
-                   _power_of_ten(travel_m / rate_mps * omega, parts=2))
+        return cls(_power_of_ten(force_n / (_MASS_KG * omega**2 * _TRAVEL_M), parts=2),
+                   _power_of_ten(travel_m / _TRAVEL_M, parts=2), _power_of_ten(travel_m / rate_mps * omega, parts=2))
 
 
 def sized(effect: Effect, vehicle: Vehicle, scales: Scales | None = None) -> Effect:

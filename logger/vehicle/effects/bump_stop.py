@@ -1,6 +1,7 @@
-"""A rubber stop ends the way of a suspension in compression.
+"""A rubber stop ends the way of a suspension in compression, and maybe another one that in extension.
 
-Beyond a clearance c of compression from rest it adds the force k (compression - c).
+Beyond a clearance c of compression from rest it adds the force k (compression - c); in extension, beyond a clearance of
+its own, with the same stiffness.
 """
 
 from __future__ import annotations
@@ -12,19 +13,23 @@ from logger.vehicle.laws import CornerLaws
 
 
 class BumpStop(ForceEffect):
-    title = "a stiff stop at the end of the suspension's travel in compression"
+    title = "a stiff stop at the end of the suspension's travel"
     parameters = (
         Parameter("clearance_m", 0.04, 0.001, 0.3, None, Scale.LINEAR, (0.01, 0.02, 0.03, 0.045, 0.06),
                   "compression from rest at which the stop is met"),
         Parameter("stop_stiffness_n_per_m", 1e5, 0.0, 2e6, 0.0, Scale.LINEAR, (1e5,), "of the stop alone"),
+        Parameter("extension_clearance_m", 0.04, 0.001, 1.0, None, Scale.LINEAR, (0.01, 0.02, 0.04, 0.06),
+                  "extension from rest at which a stop is met; 1: at none", default=1.0),
         AXLE,
     )
+    refinements = ("extension_clearance_m",)
     source = "J. Reimpell, H. Stoll, J. W. Betzler, The Automotive Chassis (2001), 5.3: additional springs"
     signature = "short hard impacts upward where the suspension is most compressed; elsewhere the model fits"
     shown_by = "drive over a large bump fast enough for the suspension to bottom out"
 
     def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
-        return laws.with_spring(lambda travel_m: p.stop_stiffness_n_per_m * np.minimum(travel_m + p.clearance_m, 0.0))
+        return laws.with_spring(lambda travel_m: p.stop_stiffness_n_per_m * (
+            np.minimum(travel_m + p.clearance_m, 0.0) + np.maximum(travel_m - p.extension_clearance_m, 0.0)))
 
 
 EFFECT = BumpStop()

@@ -18,7 +18,8 @@ class Occupant(BodyEffect):
     parameters = (
         Parameter("mass_kg", 70.0, 0.0, 1000.0, 0.0, Scale.LINEAR, (60.0,),
                   "on the spring; in a half car on one side"),
-        Parameter("frequency_hz", 4.0, 0.8, 15.0, None, Scale.LOG, (2.5, 4.0, 6.0), "of that mass on its spring"),
+        Parameter("frequency_hz", 4.0, 0.8, 15.0, None, Scale.LOG, (2.5, 4.0, 6.0, 12.0),
+                  "of that mass on its spring"),
         Parameter("damping_ratio", 0.3, 0.003, 1.5, None, Scale.LOG, (0.25,), "of that spring"),
     )
     source = "M. J. Griffin, Handbook of Human Vibration (1990), chapter 9: seated people resonate at 4 to 6 Hz"
