@@ -196,14 +196,22 @@ class Posterior:
 
     def number_slopes(self, state: State, steps: Array) -> list[Array]:
         """Derivatives of the predictions by the logarithms of the car's numbers: (p, n) per run, by differences over
-        steps (p,) of rough simulations, which are near enough."""
+        steps (p,) of rough simulations, which are near enough.
+
+        Where only the prior knows the common scale of masses and forces, the derivatives by all of them cancel. Those
+        by one-sided differences of a mode that little damps do not: they would measure the scale. There the differences
+        are central."""
         error_m = self.distance_error_m(state.record)
         near = self.beginnings(state.effects, state.logs, state.record)
 
         def predict(logs: Array) -> list[Array]:
             return self.runs.predict(self.car(state.effects, logs), error_m, rough=True, near=near)
 
-        return derivatives(predict, state.logs, steps, predict(state.logs))
+        here = predict(state.logs)
+        if self.prior.is_vague and not self.shows_forces:
+            above, below = (derivatives(predict, state.logs, some, here) for some in (steps, -steps))
+            return [(one + other) / 2 for one, other in zip(above, below, strict=True)]
+        return derivatives(predict, state.logs, steps, here)
 
 
 def derivatives(predict: Callable[[Array], Sequence[Array]], here: Array, steps: Array,
