@@ -200,7 +200,7 @@ class Posterior:
 
         Where only the prior knows the common scale of masses and forces, the derivatives by all of them cancel. Those
         by one-sided differences of a mode that little damps do not: they would measure the scale. There the differences
-        are central."""
+        are central; those of a model with effects are rid of the scale with theirs."""
         error_m = self.distance_error_m(state.record)
         near = self.beginnings(state.effects, state.logs, state.record)
 
@@ -208,7 +208,7 @@ class Posterior:
             return self.runs.predict(self.car(state.effects, logs), error_m, rough=True, near=near)
 
         here = predict(state.logs)
-        if self.prior.is_vague and not self.shows_forces:
+        if self.prior.is_vague and not self.shows_forces and not state.effects:
             above, below = (derivatives(predict, state.logs, some, here) for some in (steps, -steps))
             return [(one + other) / 2 for one, other in zip(above, below, strict=True)]
         return derivatives(predict, state.logs, steps, here)
