@@ -77,8 +77,8 @@ def test_a_factor_is_that_of_the_other_road(lira_cd: Path, tmp_path: Path, capsy
     file.write_text("\n".join([header, *(";".join([at, *(str(2 * float(one)) for one in more)])
                                          for at, *more in cells)]), "latin-1")
     _, hundred, _ = reported(capsys, "lira-cd", tmp_path / "set", "--vehicle", made.CAR)["tables"]
-    factors = {row[0]: float(row[1].split("times ")[1].split()[0]) for row in hundred["rows"]
-               if row[1].startswith("car, times")}
+    factors = {row[0]: float(row[1].split("scaled by ")[1].split()[0]) for row in hundred["rows"]
+               if row[1].startswith("car, scaled by")}
     assert factors["CPH1 HH"] == pytest.approx(2, rel=0.05)
     assert factors["CPH1 VH"] == pytest.approx(1, rel=0.05)
 
