@@ -184,6 +184,12 @@ class LabDiagnosis:
         """Whether the effects of the verdict, in a car within its priors, do not explain all."""
         return self.exceeds_noise or self.in_conflict
 
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether the residual is above the sensor's noise, even if no more than calibrated sensors may leave, of a car
+        that contradicts its priors: then its effects may imitate another one."""
+        return self.in_conflict and self.over_noise > UNEXPLAINED
+
     def exceeds_imitation(self, name: str) -> bool:
         """Whether what is left beyond the noise is less than ``IMITATION`` of what an effect of the verdict and that
         explain together: of so little, the effect is no imitation."""

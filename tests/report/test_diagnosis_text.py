@@ -133,6 +133,10 @@ def test_numbers_outside_their_tolerance_are_named_with_how_far_they_are_off() -
                                "-13% (0.87 times the file's). Measure them: either")
     missing, beyond, *_ = diagnosis_summary(replace(FOUND, beyond=found.beyond, in_conflict=True))
     assert missing.startswith("dry_friction is missing") and beyond.endswith("them: the vehicle's file is wrong there.")
+    doubtful, _, beyond, *_ = diagnosis_summary(
+        replace(FOUND, beyond=found.beyond, in_conflict=True, over_noise=3.3))
+    assert doubtful.startswith("dry_friction explains part of the residual, or imitates something else")
+    assert beyond.endswith("the vehicle's file is wrong there, or an unknown effect is missing.")
 
 
 def test_numbers_off_by_less_than_a_conflict_are_named_too() -> None:

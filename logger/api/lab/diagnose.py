@@ -404,7 +404,7 @@ def _car(found: LabDiagnosis) -> list[str]:
     if found.beyond:
         off = ", ".join(f"{name} by {share:+.0%} ({1 + share:.3g} times the file's)"
                         for name, share in found.beyond.items())
-        either = (", or an unknown effect is missing" if found.exceeds_noise else
+        either = (", or an unknown effect is missing" if found.exceeds_noise or found.is_doubtful else
                   "" if found.missing else ", or an effect is missing that acts as such a change does")
         lines.append(f"Parameters beyond their tolerance: {off}. Measure them: {'either ' * bool(either)}the vehicle's "
                      f"file is wrong there{either}.")
@@ -450,7 +450,7 @@ def _missing(found: LabDiagnosis, one: Chosen) -> str:
     if name in found.ends:
         there, count = found.ends[name]
         likely += f" The model's parameters were unknown; {there} of {count} starting points led to this result."
-    says = ("is missing" if not found.exceeds_noise or found.exceeds_imitation(name) else
+    says = ("is missing" if not found.is_doubtful and (not found.exceeds_noise or found.exceeds_imitation(name)) else
             "explains part of the residual, or imitates something else")
     if candidate.confused_with:
         names = [name, *candidate.confused_with]
