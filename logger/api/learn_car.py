@@ -41,6 +41,7 @@ from logger.identification.unknown_car import (
 from logger.printable import counted
 from logger.question import function
 from logger.report.blocks import Block, Blocks, Hint, Lines, Section, Table
+from logger.report.quantities import measured
 from logger.runs import READING
 from logger.service.config import Config
 from logger.shipped import vehicle_names, vehicle_path
@@ -266,14 +267,17 @@ def learned(question: LearnCarQuestion) -> LearnedVehicle:
 def _uneven_dampers(car: LearnedCar) -> Iterator[str]:
     """What is said where the wheels' hop has the harmonics of uneven dampers."""
     at = COORDINATES.index("dampers.unevenness")
-    uneven, std = abs(float(car.x[at])), float(car.std[at])
+    uneven = float(np.exp(car.x[at]))
+    std = uneven * float(car.std[at])
     if uneven > _SIGMA * std and uneven >= 1:  # such a damper would push the wheel on
         yield ("The harmonics of wheel hop are stronger than even dampers that act in one direction only would cause. "
                "A measured street and ridelog diagnose may show what causes them.")
     elif uneven > _SIGMA * std:
-        yield (f"The dampers are asymmetric, by a factor of {(1 + uneven) / (1 - uneven):.2g} ± "
-               f"{2 * std / (1 - uneven) ** 2:.1g} between bump and rebound. A measured street and ridelog diagnose "
-               "show which is harder (damper_asymmetry).")
+        least = uneven - 2 * std
+        factor = (measured((1 + uneven) / (1 - uneven), 2 * std / (1 - uneven) ** 2) if uneven + 2 * std < 1 else
+                  f"at least {(1 + least) / (1 - least):.2g}")
+        yield (f"The dampers are asymmetric, by a factor of {factor} between bump and rebound. A measured street and "
+               "ridelog diagnose show which is harder (damper_asymmetry).")
 
 
 def _not_linear(much: LearnedCar, little: LearnedCar) -> str:
@@ -301,7 +305,7 @@ def _check_wheelbase(problem: UnknownCar, car: LearnedCar) -> None:
     if abs(off) > max(_SIGMA * std, _WRONG_WHEELBASE):
         metres = float(np.exp(found.x[at]))
         raise CheckFailed(f"--wheelbase {problem.knowledge.wheelbase_m:g}: expected the distance that the drives show, "
-                          f"{metres:.2f} ± {max(metres * std, 0.005):.2f} m: measure it again, hub to hub on one side "
+                          f"{measured(metres, max(metres * std, 0.005))} m: measure it again, hub to hub on one side "
                           "(a trailer, or drives of two cars, cause this as well)")
 
 
@@ -461,7 +465,7 @@ def _head(used: Sequence[_Used], problem: UnknownCar, seconds: float) -> Iterato
 
 
 def _table(values: Mapping[str, float], deviations: Mapping[str, float]) -> Table:
-    cells = {name: f"{value:.3f} ± {deviations[name]:.3f}" for name, value in values.items()}
+    cells = {name: measured(value, deviations[name]) for name, value in values.items()}
     by_axle = [one.removeprefix("front.") for one in cells if one.startswith("front.")]
     return Table(("", "front", "rear"), [
         *((_with_unit(name), cells[f"front.{name}"], cells[f"rear.{name}"]) for name in by_axle),

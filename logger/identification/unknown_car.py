@@ -26,7 +26,7 @@ from logger.arrays import Array, Bools, Complex
 from logger.estimation.car_response import HIGHEST_HZ, WAVE_NUMBER_STEPS_CPM, WAVE_NUMBERS_CPM, golden_car_slope
 from logger.estimation.drive_spectra import INDEPENDENT, DriveSpectra, counts, expected, grid_hz, middles_hz
 from logger.estimation.road_spectrum import PIVOT_CPM
-from logger.vehicle.linear_car import LinearCar
+from logger.vehicle.linear_car import LinearCar, dynamic_stiffness
 from logger.vehicle.published_cars import NUMBERS, CarPrior, car_of, published_prior, share_of
 from logger.vehicle.vehicle import SensorPlace, Vehicle
 
@@ -42,6 +42,7 @@ _NOISE_APART = 1.0  # of the logarithm of what the readings hold besides: half t
 _LEAST_NOISE = 2 * 0.02**2 / 100  # m2/s4 per Hz: of a sensor of which nothing is known, 0.02 m/s2 at 100 Hz
 _RECEIVER_MPS = 0.05  # standard error of its mean speed over a block (0.1 m/s a fix, by the Doppler shift)
 _SPEED_STEP = 0.02  # of speeds that count as one, as a share
+_SPEEDS_APART = 0.2  # of the logarithm: between, what uneven dampers add is a straight line (to 4 % below 7 m/s)
 _STEP = 1e-4  # of differences that derivatives are taken by
 _MOST_ROUNDS, _MOST_HALVINGS, _MOST_INNER, _SMALL_GAIN, _SMALL_MOVE = 60, 8, 12, 1e-3, 1e-4
 _NEIGHBOURS = 10  # blocks: 20 s
@@ -59,11 +60,12 @@ a kilometre the mean bias of an IRI fell from 2.7 to 2.0 % at 10 mph and from 1.
 nothing."""
 
 EXTRA = ("wheelbase_m", "sensor.ahead_m", "dampers.unevenness", "noise")
-"""Coordinates behind those of ``NUMBERS``: logarithm, length [m], difference of a damper's slopes in rebound and
-compression over their sum, logarithm of the noise over what is known of it."""
-_UNEVENNESS = 0.25
-"""Mean and standard deviation: from even dampers to ratios of 3, of which 2 to 3 are usual (J. C. Dixon, The Shock
-Absorber Handbook, 2007, chapter 1)."""
+"""Coordinates behind those of ``NUMBERS``: logarithm, length [m], logarithm of the difference of a damper's slopes in
+rebound and compression over their sum, logarithm of the noise over what is known of it."""
+_UNEVENNESS = np.log(0.1), 1.0
+"""Mean and standard deviation of the logarithm; two of these apart are ratios of 1.03 and 7. Usual ones are 2 to 3
+(J. C. Dixon, The Shock Absorber Handbook, 2007, chapter 1). What it adds to a spectrum grows with its square, which
+vanishes where drives show none; without the logarithm so did the derivative, and searches stalled."""
 COORDINATES = (*NUMBERS, *EXTRA)
 _UNEVEN_AT = COORDINATES.index("dampers.unevenness")
 
@@ -89,7 +91,7 @@ class CarKnowledge:
         """Of all coordinates (p,)."""
         share = share_of(self.prior.mean[NUMBERS.index("rear_share")])
         ahead_m = (0.5 - share) * self.wheelbase_m if self.ahead_m is None else self.ahead_m
-        return np.concatenate([self.prior.mean, [np.log(self.wheelbase_m), ahead_m, _UNEVENNESS, 0.0]])
+        return np.concatenate([self.prior.mean, [np.log(self.wheelbase_m), ahead_m, _UNEVENNESS[0], 0.0]])
 
     @cached_property
     def precision(self) -> Array:
@@ -97,7 +99,7 @@ class CarKnowledge:
         own, whole = len(NUMBERS), np.zeros((len(NUMBERS) + len(EXTRA),) * 2)
         whole[:own, :own] = np.linalg.inv(self.prior.covariance)
         whole[own:, own:] = np.diag([
-            self.wheelbase_std**-2, self.ahead_std_m**-2, _UNEVENNESS**-2, _NOISE_APART**-2])
+            self.wheelbase_std**-2, self.ahead_std_m**-2, _UNEVENNESS[1]**-2, _NOISE_APART**-2])
         return whole
 
     @cached_property
@@ -129,11 +131,6 @@ def interference(n_cpm: Array, spread: Array, behind_m: float) -> tuple[Array, A
 def road_under(n_cpm: Array, speed_mps: Array, contact_patch_m: float) -> Array:
     """Spectrum over time (s, f) of what the patch makes of a road of waviness 2 and level 1 [1/Hz per m3]."""
     return np.asarray(np.sinc(n_cpm * contact_patch_m) ** 2 * (n_cpm / PIVOT_CPM) ** -WAVINESS / speed_mps[:, None])
-
-
-def own_rates(car: LinearCar, f_hz: Array) -> Complex:
-    """Rate of each suspension per elevation under its own wheel (w, 1, f) [1/s]."""
-    return np.asarray(2j * np.pi * f_hz * np.einsum("fww->wf", car.travel_by_wheel(f_hz))[:, None])
 
 
 def _products(of_axles: Complex) -> Complex:
@@ -210,18 +207,32 @@ class UnknownCar:
         # All but one of the derivatives are at the same wheelbase, and at the same patch.
         self._interference = lru_cache(2)(partial(interference, n_cpm, self.spread))
         self._road_under = lru_cache(2)(partial(road_under, n_cpm, self.speed_mps))
+        low, high = self.speed_mps.min(initial=np.inf), self.speed_mps.max(initial=0.0)
+        few_mps = np.geomspace(low, high, 2 + int(np.log(high / low) / _SPEEDS_APART)) if high > low else self.speed_mps
+        self._between = np.array([np.interp(self.speed_mps, few_mps, one) for one in np.eye(len(few_mps))]).T
+        self._road_of_few = lru_cache(2)(partial(road_under, grid_hz() / few_mps[:, None], few_mps))
 
     def gains(self, x: Array) -> Array:
         """Expected power of each band (s, k) per level Gd(0.2 cycle/m) of a road of waviness 2, at the drives' speeds.
         """
         car = LinearCar.of(self.knowledge.car(x, 1.0, ""))
-        structure = car.structure
-        road = self._road_under(structure.contact_patch_m)
-        forces = car.by_force(grid_hz()).T[:, None] * structure.dampers[:, None, None] * x[_UNEVEN_AT]
-        front, rear, both = (_products(car.by_wheel(grid_hz()).T[:, None]) * road
-                             + _products(forces) * sizes(_products(own_rates(car, grid_hz())) * road))
+        at: Complex = np.asarray(2j * np.pi * grid_hz())
+        structure, output = car.structure, car.output
+        wheels = len(structure.dampers)
+        pushed = np.hstack([structure.road, -np.exp(x[_UNEVEN_AT]) * structure.dampers * structure.travel.T])
+        moved = np.linalg.solve(  # by elevations under the wheels, and by |rates| of the suspensions
+            dynamic_stiffness(structure.mass, structure.damping, structure.stiffness, at), pushed.astype(complex))
+        read = at**output.order * (output.row @ moved).T[:, None]
+        rates = at * np.einsum("wn,fnw->wf", structure.travel, moved[..., :wheels])[:, None]
+        of_sizes = sizes(_products(rates) * self._road_of_few(structure.contact_patch_m))
         even, odd = self._interference(float(structure.behind_m.max()))
-        return np.asarray((front.real + rear.real + even * both.real - odd * both.imag) @ expected().T)
+
+        def of_both(front: Complex, rear: Complex, across: Complex) -> Array:
+            return np.asarray(front.real + rear.real + even * across.real - odd * across.imag)
+
+        power = self._road_under(structure.contact_patch_m) * of_both(*_products(read[:wheels]))
+        power += of_both(*self._between @ (_products(read[wheels:]) * of_sizes))
+        return np.asarray(power @ expected().T)
 
     def expected_power(self, x: Array, roads: BlockRoads) -> tuple[Array, Array]:
         """Of the road and of the noise, (b, k) and (b, 1)."""

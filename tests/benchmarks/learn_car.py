@@ -56,7 +56,7 @@ def truth(car: UnmeasuredCar) -> np.ndarray:
     share = car.rear_share
     return np.concatenate([np.log([*car.front, *car.rear, car.dynamic_index]), [
         np.log(share / (1 - share)), np.log(car.patch_m), np.log(car.wheelbase_m), ahead_of_middle_m(car),
-        (car.rebound - 1) / (car.rebound + 1), 0.0]])
+        np.log(max(1e-3, (car.rebound - 1) / (car.rebound + 1))), 0.0]])
 
 
 def ahead_of_middle_m(car: UnmeasuredCar) -> float:
