@@ -249,9 +249,12 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
 def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
                    progress: Progress = lambda words: None, effort: SearchEffort | None = None
                    ) -> tuple[Search, Selection]:
-    """The search of a diagnosis and its result; arguments as of ``diagnose``. Of a part on its bench the forces are
-    sought first. What changes any force, as a sensor or the mass of a fixture does, imitates some of any memory: it is
-    sought where forces leave something, and found where nothing is left with it."""
+    """The search of a diagnosis and its result; arguments as of ``diagnose``.
+
+    Of a part on its bench the forces are sought first. What changes any force, as a sensor or the mass of a fixture
+    does, imitates some of any memory. Where forces leave something, it is sought on top, and found where nothing
+    is left with it. Where they leave nothing, all are sought together as well, and the likelier end is taken: a mount
+    that gives imitates a delay."""
     search, before = begin_search(posterior, effects, present, progress, effort)
     forces = [one for one in search.effects if isinstance(one, ForceEffect)]
     if posterior.vehicle.model != "component" or not forces:
@@ -259,7 +262,8 @@ def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present:
     by_forces = replace(search, effects=forces)
     selection = by_forces.run(before)
     if not exceeds_noise(selection.now):
-        return by_forces, selection
+        together = search.run(before)
+        return (by_forces, selection) if selection.now.score <= together.now.score else (search, together)
     wider, more = by_forces.with_more(selection, [one for one in search.effects if one not in forces])
     return (by_forces, selection) if exceeds_noise(more.now) else (wider, more)
 
