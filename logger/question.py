@@ -34,8 +34,10 @@ from typing import (
     Literal,
     NamedTuple,
     ParamSpec,
+    Protocol,
     TypeVar,
     Union,
+    cast,
     get_args,
     get_origin,
 )
@@ -446,25 +448,36 @@ def askings(question: type[Any]) -> tuple[Asking, ...]:
     return tuple(sorted(found, key=lambda one: (not isinstance(one.option, Argument), one.default is not MISSING)))
 
 
-def function(name: str, question: Callable[P, Asked], answer: Callable[[Asked], R]) -> Callable[P, R]:
-    """The verb as a function in Python: it takes the question's fields, and gives the answer. It stands in the module
-    of ``answer``, by this name."""
-    def ask(*values: P.args, **options: P.kwargs) -> R:
-        try:
-            bound = signature.bind(*values, **options)
-        except TypeError as error:
-            raise TypeError(f"{name}() {error}") from None
-        return answer(question(*bound.args, **bound.kwargs))
+class Function(Protocol[P, R]):
+    """A verb as a function in Python; ``answer``: to its question as a whole."""
 
-    of = question if isinstance(question, type) else type(question)
-    signature = inspect.Signature(_parameters(of))
-    ask.__name__ = ask.__qualname__ = name
-    ask.__module__ = answer.__module__
-    ask.__doc__ = "\n".join([inspect.getdoc(of) or "", "", *_described(of)])
-    ask.__dict__["__signature__"] = inspect.Signature([
-        one.replace(annotation=_Shown(one.annotation), default=_Shown(one.default) if callable(one.default) and
-                    one.default is not one.empty else one.default) for one in _parameters(of)])
-    return ask
+    answer: Callable[[Any], R]
+
+    def __call__(self, *values: P.args, **options: P.kwargs) -> R: ...
+
+
+def function(question: Callable[P, Asked]) -> Callable[[Callable[[Asked], R]], Function[P, R]]:
+    """Make of what answers a question the verb's function in Python, of its name: it takes the question's fields, and
+    its help is the question's."""
+    def of(answer: Callable[[Asked], R]) -> Function[P, R]:
+        def ask(*values: P.args, **options: P.kwargs) -> R:
+            try:
+                bound = signature.bind(*values, **options)
+            except TypeError as error:
+                raise TypeError(f"{answer.__name__}() {error}") from None
+            return answer(question(*bound.args, **bound.kwargs))
+
+        asks = question if isinstance(question, type) else type(question)
+        signature = inspect.Signature(_parameters(asks))
+        ask.__name__, ask.__qualname__, ask.__module__ = answer.__name__, answer.__name__, answer.__module__
+        ask.__doc__ = "\n".join([inspect.getdoc(asks) or "", "", *_described(asks)])
+        ask.__dict__["__signature__"] = inspect.Signature([
+            one.replace(annotation=_Shown(one.annotation), default=_Shown(one.default) if callable(one.default) and
+                        one.default is not one.empty else one.default) for one in _parameters(asks)])
+        ask.__dict__["answer"] = answer
+        return cast("Function[P, R]", ask)
+
+    return of
 
 
 def _parameters(question: type[Any]) -> list[inspect.Parameter]:

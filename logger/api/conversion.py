@@ -47,8 +47,8 @@ class Conversion(CommandResult):
     damaged_lines: int
 
 
-def converted(question: ConvertQuestion) -> Conversion:
-    """The answer to ``ConvertQuestion``, which says what is raised."""
+@function(ConvertQuestion)
+def convert(question: ConvertQuestion) -> Conversion:
     path, smoothness = Path(question.to), question.smoothness
     form, found = format_of(path), find_logs_in(question.places)
     check_out(path, (), [*([] if smoothness is None else [Path(smoothness)]), *(log for log, _ in found)], "--to")
@@ -64,9 +64,6 @@ def converted(question: ConvertQuestion) -> Conversion:
     made = {"file": str(path), "format": form.name, "rows" if smoothness is None else "ways": rows, "placed": placed,
             "damaged_lines": damaged_lines, **left_out_json(left_out)}
     return Conversion("\n".join([words, *left_out_lines(left_out)]), made, path, form.name, rows, placed, damaged_lines)
-
-
-convert = function("convert", ConvertQuestion, converted)
 
 
 def _ways(files: Sequence[LoggedFile], roads: Path | str) -> Layer:

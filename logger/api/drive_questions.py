@@ -221,7 +221,7 @@ class ModesQuestion(Question):
     With --vehicle and no FILE, modes gives those of the vehicle's file with its effects, and standard deviations from
     the standard errors in the file. It linearises nonlinear forces at a speed, on a road of IRI 2.5 m/km.
 
-    In Python: the record has 100 samples or more; of a vehicle alone as ``vehicle_modes``. Raises BadInput for what
+    In Python: the record has 100 samples or more; modes of a vehicle alone have no channels. Raises BadInput for what
     does not fit together, a record that is too short for it, and as ``read_channels``. Source: P. van Overschee and
     B. de Moor, Subspace Identification (1996); each method's own module below ``logger.modal``.
 
@@ -233,8 +233,8 @@ class ModesQuestion(Question):
     ([1.5], [0.02])
     """
 
-    record: Annotated[Union["ChannelRecord", Path, str], Argument(
-        "CSV with t_s and one column per sensor", metavar="FILE", read=Path)]
+    record: Annotated[Union["ChannelRecord", Path, str, None], Argument(
+        "CSV with t_s and one column per sensor", metavar="FILE", read=Path)] = None
     method: Annotated[str | None, Option(
         f"{', '.join(MODAL_METHODS)}: era for a free decay, ssi for a random response, n4sid with a measured input "
         "(default: chosen from the record); decrement is Eq 5.2 of Blum 2015, for one mode of a free decay; not with "
@@ -253,14 +253,6 @@ class ModesQuestion(Question):
         f"without a FILE: speed at which nonlinear forces are linearised (default: {COMMON_SPEED_MPS:g}); with a "
         "FILE that has no speed: speed of the drive", SPEED, "MPS")] = None
 
-
-@dataclass(frozen=True)
-class ModesCommand(ModesQuestion):
-    __doc__ = ModesQuestion.__doc__    # at the terminal a vehicle alone can be asked for as well
-
-    record: Annotated[Union["ChannelRecord", Path, str, None], Argument(
-        "CSV with t_s and one column per sensor", metavar="FILE", read=Path)] = None  # type: ignore[assignment]
-
     def __post_init__(self) -> None:
         super().__post_init__()
         if self.record is None and self.vehicle is None:
@@ -276,19 +268,35 @@ class ModesCommand(ModesQuestion):
             raise self.complaint("--out: expected a FILE with it")
 
 
-COMFORT = Verb(ComfortQuestion, "logger.api.rides:comfort_of", (PICTURES,))
-CALIBRATE = Verb(CalibrateQuestion, "logger.api.vehicles:calibration_of", (
+COMFORT = Verb(ComfortQuestion, "logger.api.rides:comfort", (PICTURES,))
+CALIBRATE = Verb(CalibrateQuestion, "logger.api.vehicles:calibrate", (
     Out("write the figures of each speed as CSV", metavar="FILE", others=("*",), many=False, is_drawn=False),))
-ESTIMATE = Verb(EstimateQuestion, "logger.api.drives:estimated", (
+ESTIMATE = Verb(EstimateQuestion, "logger.api.drives:estimate", (
     Out("write the windows as CSV; FILE.html, .png, .svg or .pdf: pictures; may repeat", metavar="FILE", others=("*",)),
     Out("write the estimated profile as CSV", "--profile-out", "FILE", ("*",), many=False, is_drawn=False)))
-MODES = Verb(ModesCommand, "logger.api.modal:asked_modes", (PICTURES,))
+MODES = Verb(ModesQuestion, "logger.api.modal:modes", (PICTURES,))
 
 
 _OBSTACLES = ("add an obstacle to the road [m]; may repeat. bump (Eq 4.41 of Blum 2015): start_m, height_m, width_m; "
               "step: start_m, height_m; ramp: start_m, height_m, length_m; plate: start_m, height_m, length_m[, "
               "edge_m]; pothole: start_m, depth_m, length_m[, edge_m]. "
               'In Python: {"bump": {"start_m": 20, "height_m": 0.08, "width_m": 3.6}}')
+
+
+_FLAT = Range(1.0, 10_000.0, "m")
+
+
+def _file_or(unit: str) -> Callable[[str], float | Path]:
+    """A reader of a number in a unit, or of a file's name."""
+    def read(text: str) -> float | Path:
+        try:
+            return float(text)
+        except ValueError:
+            if text[:1].isdigit() and not Path(text).exists():
+                raise ValueError(f"expected a number in {unit}, without its unit, or a file") from None
+            return Path(text)
+
+    return read
 
 
 @dataclass(frozen=True)
@@ -311,8 +319,8 @@ class SimulateQuestion(Question):
     Physical effects are those of the vehicle's file, then those of --effect; docs/reference/effects.md lists them. The
     speed asked for is the true one: with speed_scale the recorded speed differs.
 
-    In Python: a run. Raises BadInput for what no car can do, obstacles that do not lie on the road, and as
-    ``read_vehicle`` and ``read_profile``.
+    In Python: a run; speeds may also be times (k,) [s], growing, and speeds (k,) [m/s]. Raises BadInput for what no car
+    can do, obstacles that do not lie on the road, and as ``read_vehicle`` and ``read_profile``.
 
     >>> run = simulate("rav4-2009", random_road(iso_class="B", length_m=100.0), speed_mps=10.0)
     >>> run.accel_z_mps2.shape, round(float(run.accel_z_mps2.std()), 2)
@@ -323,10 +331,12 @@ class SimulateQuestion(Question):
     """
 
     vehicle: VehicleName
-    profile: Annotated[Union["Wheelpaths", Path, str], "the road [m]; of two tracks a full car uses both, others the "
-                                                         "left"]
-    speed_mps: Annotated[float | tuple[Any, Any], "constant, 0.1 to 100 m/s; or times (k,) [s], growing, "
-                                                  "and speeds (k,) [m/s] with straight lines between them"]
+    profile: Annotated[Union["Wheelpaths", Path, str, float, None], Option(
+        f"CSV (distance_m,elevation_m[,elevation_right_m]) or ERD; of two tracks a full car uses both, other cars the "
+        f"left one. A number: a flat road of this length, {_FLAT.words}", metavar="FILE|M", read=_file_or("m"))] = None
+    speed_mps: Annotated[float | tuple[Any, Any] | Path | None, Option(
+        f"constant, {SPEED.words}; or a CSV with t_s,speed_mps, interpolated linearly: the drive lasts as "
+        "long as the file", metavar="MPS|FILE", read=_file_or("m/s"))] = None
     _: KW_ONLY
     obstacles: Annotated[Mapping[str, Mapping[str, float]] | Sequence[str] | None, Option(
         _OBSTACLES, metavar="NAME:PARAM=VALUE,...", read=str, many=list, flag="--obstacle")] = None
@@ -335,41 +345,6 @@ class SimulateQuestion(Question):
     step_mps2: Annotated[float, Option("quantisation step of the sensor [m/s2]", ADDED, "MPS2")] = 0.0
     seed: Annotated[int, Option("seed of the noise (default: 1)", Range(0, float("inf")), "N")] = 1
     name: Annotated[str, "of the run; each of several needs its own"] = "simulated"
-
-    def __post_init__(self) -> None:
-        super().__post_init__()
-        if isinstance(self.speed_mps, int | float) and (words := SPEED.fault(self.speed_mps)):
-            raise self.wrong("speed_mps", words)
-
-
-_FLAT = Range(1.0, 10_000.0, "m")
-
-
-def _file_or(unit: str) -> Callable[[str], float | Path]:
-    """A reader of a number in a unit, or of a file's name."""
-    def read(text: str) -> float | Path:
-        try:
-            return float(text)
-        except ValueError:
-            if text[:1].isdigit() and not Path(text).exists():
-                raise ValueError(f"expected a number in {unit}, without its unit, or a file") from None
-            return Path(text)
-
-    return read
-
-
-@dataclass(frozen=True)
-class SimulateCommand(SimulateQuestion):
-    __doc__ = SimulateQuestion.__doc__    # at the terminal files stand for roads, and more can be asked for
-
-    profile: Annotated[Path | float | None, Option(
-        f"CSV (distance_m,elevation_m[,elevation_right_m]) or ERD; of two tracks a full car uses both, other cars the "
-        f"left one. A number: a flat road of this length, {_FLAT.words}", metavar="FILE|M",
-        read=_file_or("m"))] = None  # type: ignore[assignment]
-    speed_mps: Annotated[float | Path | None, Option(
-        f"constant, {SPEED.words}; or a CSV with t_s,speed_mps, interpolated linearly: the drive lasts as "
-        "long as the file", metavar="MPS|FILE", read=_file_or("m/s"))] = None  # type: ignore[assignment]
-    _: KW_ONLY
     excitation: Annotated[Path | None, Option(
         "for a test rig, in place of --profile and --speed: the elevation under its wheels over time, as CSV "
         "(t_s,elevation_m[,elevation_rear_m])", metavar="FILE", read=Path)] = None
@@ -389,8 +364,10 @@ class SimulateCommand(SimulateQuestion):
             raise self.wrong(beside[0], ": expected none with `excitation`, as a rig has no road")
         if self.excitation is None and (missing := [one for one in ("profile", "speed_mps") if given[one] is None]):
             raise self.complaint(f"simulate: expected {', '.join(f'`{one}`' for one in missing)}")
-        if isinstance(self.profile, float) and (words := _FLAT.fault(self.profile)):
-            raise self.wrong("profile", words)
+        for name, within in (("profile", _FLAT), ("speed_mps", SPEED)):
+            value = getattr(self, name)
+            if isinstance(value, int | float) and (words := within.fault(value)):
+                raise self.wrong(name, words)
 
     def named(self) -> str:
         return str(self.excitation or self.profile)
@@ -400,7 +377,7 @@ class SimulateCommand(SimulateQuestion):
         return [*(one for one in given if isinstance(one, Path)), *files_of(self.vehicle)]
 
 
-SIMULATE = Verb(SimulateCommand, "logger.api.simulation:simulation", (
+SIMULATE = Verb(SimulateQuestion, "logger.api.drives:simulation", (
     Out("drive to write; a file called profile.csv: the road that was driven, with its obstacles. Both in one folder "
         "form a run. FILE.html, .png, .svg or .pdf: pictures; may repeat", metavar="FILE", others=("*",),
         required=True),))
@@ -508,9 +485,9 @@ class RandomRoadQuestion(Question):
             raise self.complaint(f"{both} the last sample at {LENGTH.low:g} m or more, it lies at {last_m:g} m")
 
 
-EXACT_IRI = Verb(IriQuestion, "logger.api.roads:iri_of", (PICTURES,))
-CLASSIFY = Verb(ClassifyQuestion, "logger.api.roads:road_class_of", (PICTURES,))
-GENERATE = Verb(RandomRoadQuestion, "logger.api.roads:random_road_of")
+EXACT_IRI = Verb(IriQuestion, "logger.api.roads:iri", (PICTURES,))
+CLASSIFY = Verb(ClassifyQuestion, "logger.api.roads:classify", (PICTURES,))
+GENERATE = Verb(RandomRoadQuestion, "logger.api.roads:random_road")
 
 
 # --- learn-car ---
@@ -564,6 +541,6 @@ class LearnCarQuestion(LongQuestion):
         "an earlier vehicle file of this car: report what has changed", metavar="FILE.yaml", read=Path)] = None
 
 
-LEARN_CAR = Verb(LearnCarQuestion, "logger.api.learn_car:learned", (
+LEARN_CAR = Verb(LearnCarQuestion, "logger.api.learn_car:learn_car", (
     Out("write the vehicle's file; FILE.html, .png, .svg or .pdf: measured and modelled spectra by speed, before and "
         "after; may repeat", metavar="mycar.yaml", others=(".yaml", ".yml")),))

@@ -1,13 +1,11 @@
-"""Drives: recorded ones as runs, and the roughness of the road as a drive shows it.
-
-What was estimated of a drive's road, for a person and for a program.
-"""
+"""Drives: recorded and simulated ones as runs, and the roughness of the road as a drive shows it."""
 
 from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from inspect import getdoc
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -15,10 +13,11 @@ import numpy as np
 import numpy.typing as npt
 
 from logger import bounds
-from logger.api.drive_questions import EstimateQuestion
+from logger.api.drive_questions import EstimateQuestion, SimulateQuestion
 from logger.api.roads import Profile, read_profile, write_profile
+from logger.api.shared_fields import named_numbers
 from logger.api.shown import CommandResult, Shown, checks_json, checks_lines, table
-from logger.api.vehicles import model_of
+from logger.api.vehicles import car_on, check_forces, model_of
 from logger.chart_data import Array, Chart, Curves, Line, line
 from logger.dsp.channel_faults import released_at
 from logger.errors import BadInput
@@ -39,32 +38,30 @@ from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.question import Notify, function, silent
 from logger.report.blocks import Block, Blocks, Hint, Lines, Table
-from logger.report.quantities import known
+from logger.report.quantities import known, numbers_of
+from logger.roads.iri import doubt_of
 from logger.runs import SKIP_S, UNKNOWN, Past, past_of
 from logger.runs import Run as Record
+from logger.simulation import virtual_drive
 from logger.simulation.virtual_drive import SimulatedRuns
-from logger.store.formats import drive_file, vehicle_file
+from logger.store.formats import drive_file, profile_file, vehicle_file
 from logger.store.formats.drive_file import facts_beside, write_run_facts
+from logger.store.formats.effect_file import effect_named
 from logger.store.formats.record_checks import EvenRecord, RecordRules, even_columns
+from logger.store.formats.vehicle_file import CarModel, check_moves_itself
+from logger.vehicle.compose import Car, with_effect
+from logger.vehicle.effect import Chosen, chosen
+from logger.vehicle.structure import Output, Structure, body_point, suspension_travel, tire_deflection, wheel
+from logger.vehicle.uncertain import sized
+from logger.vehicle.vehicle import Vehicle
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Run(drive_file.Drive, Shown):
-    """What a recorder wrote down while it drove, or while a rig was driven, arrays (n,), and the road or excitation.
-
-    path           of its folder or file; of a simulated one its name
-    rate_hz        samples a second
-    time_s         evenly spaced [s]
-    accel_z_mps2   of the sensor, up positive, gravity removed, band-limited by the recorder [m/s2]
-    speed_mps      [m/s]; on a rig 0
-    distance_m     where the front tires stand on the profile [m]; on a rig 0
-    lat_deg, lon_deg    None where they were not recorded
-    usable         0 where there was no reading, 1 where there was, 2 where it was clipped; None: all are readings
-    facts          what is known of the record
-    more           columns (n,) of the signals that ``facts`` has, by name
-    profile        the road that was driven; None: not known
-    excitation     what moved the wheels of a rig, counted from the first sample; None: it is no rig
-    """
+    __doc__ = f"""{getdoc(drive_file.Drive)}
+profile        the road that was driven; None: not known
+excitation     what moved the wheels of a rig, counted from the first sample; None: it is no rig
+"""
 
     profile: Profile | None = None
     excitation: Excitation | None = None
@@ -286,8 +283,8 @@ class Estimate(CommandResult):
         return [Curves(self.title, "distance [m]", "IRI [m/km]", tuple(lines))] if known.any() else []
 
 
-def estimated(question: EstimateQuestion) -> Estimate:
-    """The answer to ``EstimateQuestion``, which says what is raised."""
+@function(EstimateQuestion)
+def estimate(question: EstimateQuestion) -> Estimate:
     model = model_of(question.vehicle)
     drive, checked = checked_run(question.run, RecordRules(question.unit, question.resample_hz))
     found = assessed(drive, model, *sensor_of(drive, question.noise_mps2, question.step_mps2), question.window_m,
@@ -301,9 +298,6 @@ def estimated(question: EstimateQuestion) -> Estimate:
                     found.least_error_m_per_km, windows.flags,
                     tuple(Profile(one.start_m, one.spacing_m, one.elevation_m, None) for one in parts),
                     tuple(doubt.words for doubt in checked.doubts))
-
-
-estimate = function("estimate", EstimateQuestion, estimated)
 
 
 def sensor_of(run: Run, noise_mps2: float | str | None = None, step_mps2: float | None = None) -> tuple[Sensor, bool]:
@@ -508,3 +502,215 @@ def _table(summary: dict[str, Any]) -> Iterator[Block]:
     if "comparison" in summary:
         yield Hint("R2 against the profile; in 1, in 2: share of windows within one and two standard errors (ideal: "
                    "0.68, 0.95).")
+
+
+# --- simulated drives ---
+
+WHEELS = {1: ("front",), 2: ("front", "rear"), 4: ("front_left", "front_right", "rear_left", "rear_right")}
+OUTPUTS = ("wheels", "travel", "tires", "displacement", "velocity", "body")
+
+
+@function(SimulateQuestion)
+def simulate(question: SimulateQuestion) -> Run:
+    return simulation(question).run
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Simulation(CommandResult):
+    """A simulated drive, with the columns that were asked for, on a road or a rig.
+
+    columns    (n,) each, by name, as the drive's file has them
+    track      that was driven, with its obstacles, or what moved a rig
+    doubts     about the road, a line each
+    """
+
+    columns: Mapping[str, Array]
+    track: Track | Excitation
+    run: Run
+    doubts: tuple[str, ...]
+    title: ClassVar[str] = "Simulated drive"
+
+    def charts(self) -> Sequence[Chart]:
+        """Of the drive."""
+        return self.run.charts()
+
+    def remarks(self, written: Mapping[str, Sequence[Path]]) -> Sequence[str]:
+        """What makes one doubt the road."""
+        return self.doubts
+
+    def write(self, path: Path, option: str = "--out") -> None:
+        """Write the road, of which the file is called ``profile.csv``, or the drive. BadInput for the road of a rig."""
+        if path.name != drive_file.PROFILE:
+            drive_file.write_drive(path, self.columns)
+            self._json["file"] = str(path)
+        elif isinstance(self.track, Track):
+            drive_file.write_profile(path, self.track)
+        else:
+            raise BadInput(f"{option} {path}: a rig has no road")
+
+
+def simulation(question: SimulateQuestion) -> Simulation:
+    """The answer to ``SimulateQuestion``, which says what is raised."""
+    model, effects, said = _model(question)
+    check_moves_itself(model.vehicle)
+    doubt = ""
+    if question.excitation is not None:
+        place = question.excitation.parent
+        track: Track | Excitation = profile_file.read_excitation(question.excitation, drive_file.read_forces(place))
+        check_forces(model.vehicle, track, str(place / drive_file.RUN))
+    else:
+        track, doubt = _road(question)
+    car = car_on(model.vehicle, effects, said, track)
+    outputs = _outputs(question.outputs, car.vehicle, car.structure)
+    try:
+        motion = _motion(question, car, track)
+    except ValueError as error:
+        raise BadInput(str(error)) from None
+    try:
+        columns = _columns(question, car, track, motion, outputs)
+    except ValueError as error:
+        raise BadInput(f"{car.vehicle.name}: {error}") from None
+    run = _run(question, columns, track)
+    accel, rate_hz = run.accel_z_mps2, question.rate_hz
+    away = drive_file.COLUMNS[2:] if track.timed else ()
+    way = {} if track.timed else {
+        "distance_start_m": float(run.distance_m[0]), "distance_end_m": float(run.distance_m[-1]),
+        "speed_mean_mps": float(run.speed_mps.mean())}
+    made = {
+        "vehicle": model.vehicle.name, "model": model.vehicle.model, "file": None, "samples": len(accel),
+        "rate_hz": rate_hz, "duration_s": len(accel) / rate_hz, **way,
+        "accel_rms_mps2": float(np.sqrt(np.mean(accel**2))),
+        "accel_min_mps2": float(accel.min()), "accel_max_mps2": float(accel.max()),
+        "noise_mps2": question.noise_mps2, "step_mps2": question.step_mps2, "seed": question.seed,
+        "more_columns": list(columns)[len(drive_file.COLUMNS):],
+        "effects": [{"effect": one.effect.name, "parameters": dict(one.values)} for one in effects],
+    }
+    more = f"; also {', '.join(list(columns)[len(drive_file.COLUMNS):])}" * (len(columns) > len(drive_file.COLUMNS))
+    for one in effects:
+        more += "\n  with " + ", ".join(filter(None, (one.effect.name, numbers_of(one))))
+    along = (f"{run.distance_m[0]:.2f} to {run.distance_m[-1]:.2f} m at {run.speed_mps.mean():.2f} m/s on average, "
+             * (not track.timed))
+    return Simulation(
+        f"{model.vehicle.name} ({model.vehicle.model.replace('_', ' ')}), {made['duration_s']:.2f} s in {len(accel)} "
+        f"samples, {along}acceleration {made['accel_rms_mps2']:.3f} m/s2 r.m.s., {accel.min():.2f} to "
+        f"{accel.max():.2f}{more}", made, {name: one for name, one in columns.items() if name not in away}, track, run,
+        (doubt,) if doubt else ())
+
+
+def _columns(question: SimulateQuestion, car: Car, track: Track | Excitation,
+             motion: virtual_drive.FrontAxleMotion, outputs: Mapping[str, Output]) -> dict[str, Array]:
+    """What is recorded (n,), by name. ValueError for what no car can do."""
+    place = car.vehicle.sensor
+    sensor = {virtual_drive.SENSOR: body_point(car.structure, place.ahead_m, place.left_m)}
+    return virtual_drive.recorded_drive(
+        car, {**sensor, **outputs}, track.begun(float(motion.time_s[0])), motion, question.rate_hz,
+        virtual_drive.SensorErrors(question.noise_mps2, question.step_mps2, question.seed))
+
+
+def _motion(question: SimulateQuestion, car: Car, track: Track | Excitation) -> virtual_drive.FrontAxleMotion:
+    """ValueError for a drive that is too short, too long, or not on the road."""
+    speed = question.speed_mps
+    if isinstance(track, Excitation):
+        return virtual_drive.standing(track, question.rate_hz)
+    if isinstance(speed, tuple | list):
+        times_s, speeds_mps = speed
+        knots = _knots(times_s, speeds_mps, question.name)
+    elif isinstance(speed, Path):
+        knots = drive_file.read_speeds(speed)
+    else:
+        assert speed is not None    # this is no rig
+        knots = virtual_drive.at_one_speed(track, float(car.structure.behind_m.max()), speed)
+    return virtual_drive.motion_along(*knots, track.start_m, question.rate_hz)
+
+
+def _run(question: SimulateQuestion, columns: Mapping[str, Array], track: Track | Excitation) -> Run:
+    time_s, accel, speed_mps, distance_m = (columns[name] for name in (drive_file.TIME, *drive_file.COLUMNS[1:]))
+    profile, excitation = ((None, track.begun(float(time_s[0]))) if isinstance(track, Excitation) else
+                           (_profile_of(track), None))
+    more = {name: one for name, one in columns.items() if name not in (drive_file.TIME, *drive_file.COLUMNS)}
+    return Run(Path(question.name), question.rate_hz, time_s, accel, speed_mps, distance_m, None, None, profile,
+               excitation, more=more)
+
+
+def _obstacles(question: SimulateQuestion) -> list[virtual_drive.Obstacle]:
+    given = question.obstacles or {}
+    if isinstance(given, Mapping):
+        return [virtual_drive.Obstacle(kind, values, f"obstacle {kind}") for kind, values in given.items()]
+    return [virtual_drive.Obstacle(*named_numbers(text, "--obstacle"), f"--obstacle {text}") for text in given]
+
+
+def _knots(time_s: npt.ArrayLike, speed_mps: npt.ArrayLike, name: str) -> tuple[Array, Array]:
+    times, speeds = (np.asarray(one, dtype=np.float64) for one in (time_s, speed_mps))
+    grows, possible = (np.diff(times) > 0).all(), ((speeds >= 0) & (speeds <= 100)).all()
+    if not 1 < len(times) == len(speeds) or not (grows and possible):
+        raise BadInput(f"{name}: expected two or more increasing times, and as many speeds of 0 to 100 m/s")
+    return times, speeds
+
+
+def _profile_of(track: Track) -> Profile:
+    tracks = track.elevation_m.reshape(len(track.elevation_m), -1).T
+    return Profile(track.start_m, track.spacing_m, tracks[0], tracks[1] if len(tracks) > 1 else None)
+
+
+def _model(question: SimulateQuestion) -> tuple[CarModel, tuple[Chosen, ...], dict[str, str]]:
+    """The vehicle, its effects and those that are asked for, and where each was said, by name."""
+    model = model_of(question.vehicle)
+    name = str(question.vehicle) if isinstance(question.vehicle, Path | str) else model.vehicle.name
+    effects, asked = model.effects, dict[str, str]()
+    for text in question.effects:
+        effect_name, values = named_numbers(text, "--effect")
+        effect, file = effect_named(effect_name)
+        effect = effect if file else sized(effect, model.vehicle)
+        if effect.name in asked:
+            raise BadInput(f"--effect {text}: expected each effect once")
+        asked[effect.name] = f"--effect {text}"
+        try:
+            effects = with_effect(effects, chosen(effect, effect.usual | values, file=file))
+        except ValueError as error:
+            raise BadInput(f"--effect {text}: {error}") from None
+    return model, effects, {one.effect.name: name for one in model.effects} | asked
+
+
+def _outputs(wanted: Sequence[str], vehicle: Vehicle, structure: Structure) -> dict[str, Output]:
+    """Outputs by the names of their columns."""
+    found: dict[str, Output] = {}
+    each = {"wheels": ("wheel_{}_mps2", wheel), "travel": ("travel_{}_m", suspension_travel),
+            "tires": ("tire_{}_m", tire_deflection)}
+    for text in wanted:
+        name, place = named_numbers(text, "--output")
+        if name in ("displacement", "velocity") and not place:
+            order = ("displacement", "velocity").index(name)
+            found[("displacement_m", "velocity_mps")[order]] = body_point(
+                structure, vehicle.sensor.ahead_m, vehicle.sensor.left_m, order)
+        elif structure.on_base and text == "travel":
+            found["travel_m"] = suspension_travel(structure, 0)
+        elif structure.on_base and name in each:
+            raise BadInput(f"--output {text}: expected displacement, velocity or travel of a single mass")
+        elif name in each and not place:
+            column, output = each[name]
+            found |= {column.format(side): output(structure, index)
+                      for index, side in enumerate(WHEELS[len(structure.wheels)])}
+        elif name == "body" and set(place) <= {"ahead_m", "left_m"}:
+            ahead_m, left_m = place.get("ahead_m", 0.0), place.get("left_m", 0.0)
+            try:
+                found[f"body_{ahead_m:g}_{left_m:g}_mps2"] = body_point(structure, ahead_m, left_m)
+            except ValueError as error:
+                raise BadInput(f"--output {text}: {error}") from None
+        else:
+            raise BadInput(f"--output {text}: expected one of {', '.join(OUTPUTS[:-1])}, body:ahead_m=X,left_m=Y")
+    return found
+
+
+def _road(question: SimulateQuestion) -> tuple[Track, str]:
+    """The road with its obstacles, and what makes one doubt it. BadInput for files and obstacles that are wrong."""
+    given = question.profile
+    assert given is not None    # this is no rig
+    if isinstance(given, int | float):
+        track, doubt = Track(float(given), np.zeros(2)), ""
+    else:
+        profile = given if isinstance(given, profile_file.Wheelpaths) else read_profile(given)
+        track, doubt = drive_file.track_of(profile), doubt_of(profile.elevation_m, profile.spacing_m)
+    try:
+        return virtual_drive.with_obstacles(track, _obstacles(question)), doubt
+    except ValueError as error:
+        raise BadInput(str(error)) from None

@@ -58,8 +58,8 @@ class FleetSummary(CommandResult):
         return roads_layer(self.found.roads)
 
 
-def ingested(question: IngestQuestion) -> Ingested:
-    """The answer to ``IngestQuestion``, which says what is raised."""
+@function(IngestQuestion)
+def fleet_ingest(question: IngestQuestion) -> Ingested:
     from logger.fleet.ingest import ingest_sessions, keep_names, own_key, pseudonym, sessions_of
     from logger.fleet.page import ingest_json, ingest_words
     from logger.store.log.log_reader import find_logs_in
@@ -83,18 +83,12 @@ def ingested(question: IngestQuestion) -> Ingested:
     return Ingested(ingest_words(counts, rows, str(dataset.folder)), ingest_json(counts, rows), counts.added, rows)
 
 
-fleet_ingest = function("fleet_ingest", IngestQuestion, ingested)
-
-
-def summarised(question: SummariseQuestion) -> FleetSummary:
-    """The answer to ``SummariseQuestion``, which says what is raised."""
+@function(SummariseQuestion)
+def fleet_summarise(question: SummariseQuestion) -> FleetSummary:
     from logger.fleet.page import figures_words
 
     with _summarised(question, question.by) as (figures, _, _):
         return FleetSummary(figures_words(figures), {}, figures)
-
-
-fleet_summarise = function("fleet_summarise", SummariseQuestion, summarised)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -105,8 +99,8 @@ class FleetReport(CommandResult):
     tiles: int
 
 
-def reported(question: ReportQuestion) -> FleetReport:
-    """The answer to ``ReportQuestion``, which says what is raised."""
+@function(ReportQuestion)
+def fleet_report(question: ReportQuestion) -> FleetReport:
     from logger.fleet.page import INDEX, check_folder, history_of, write_report
 
     place = Path(question.out)
@@ -120,9 +114,6 @@ def reported(question: ReportQuestion) -> FleetReport:
     page = place / INDEX
     text = f"Report: {page} ({len(figures.roads.key):,} segments, {tiles:,} tiles)"
     return FleetReport(text, {"page": str(page), "tiles": tiles, "segments": len(figures.roads.key)}, page, tiles)
-
-
-fleet_report = function("fleet_report", ReportQuestion, reported)
 
 
 @contextmanager

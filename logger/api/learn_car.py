@@ -10,9 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from logger.api.csv_extraction import CsvSettings, recorded_csv
 from logger.api.drive_questions import LearnCarQuestion
-from logger.api.extraction import even_drives, recorded_dump
+from logger.api.extraction import CsvSettings, even_drives, recorded_csv, recorded_dump
 from logger.api.shared_fields import each
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, read_vehicle
@@ -40,7 +39,7 @@ from logger.identification.unknown_car import (
 )
 from logger.printable import counted
 from logger.question import function
-from logger.report.blocks import Block, Blocks, Hint, Lines, Section, Table
+from logger.report.blocks import Blocks, Hint, Lines, Section, Table
 from logger.report.quantities import measured
 from logger.runs import READING
 from logger.service.config import Config
@@ -238,8 +237,8 @@ def _used(question: LearnCarQuestion) -> list[_Used]:
     return _thinned([one for one in found if len(one.spectra)])
 
 
-def learned(question: LearnCarQuestion) -> LearnedVehicle:
-    """The answer to ``LearnCarQuestion``, which says what is raised."""
+@function(LearnCarQuestion)
+def learn_car(question: LearnCarQuestion) -> LearnedVehicle:
     used = _used(question)
     knowledge = CarKnowledge(question.wheelbase_m, ahead_m=question.sensor,
                              ahead_std_m=_USUAL_STD_M if question.sensor is None else _GIVEN_STD_M)
@@ -353,7 +352,6 @@ def _checked_drives(used: Sequence[_Used], knowledge: CarKnowledge, start: Array
 
 
 def _value(car: LearnedCar, name: str) -> str:
-
     at = COORDINATES.index(name)
     value = float(np.exp(car.x[at]))
     return f"{value:.3g} ± {value * float(car.std[at]):.1g} {_WORDS[name.rpartition('.')[2]][1]}".strip()
@@ -392,7 +390,6 @@ def _check_car(problem: UnknownCar, car: LearnedCar) -> None:
 
 def _answer(question: LearnCarQuestion, used: Sequence[_Used], problem: UnknownCar, car: LearnedCar,
             missing: Sequence[str], unseen: Sequence[tuple[DriveSpectra, LearnedCar]]) -> LearnedVehicle:
-
     knowledge, own = problem.knowledge, len(NUMBERS)
     errors = _unseen_errors(knowledge, unseen)
     speeds = [mph * MPH_MPS for mph in _SPEEDS_MPH]
@@ -422,7 +419,10 @@ def _answer(question: LearnCarQuestion, used: Sequence[_Used], problem: UnknownC
         "effects_missing": list(missing), "changes": moved, "other_than_settings": misfits}
     content = Blocks([Lines([*_head(used, problem, seconds)]), _table(values, deviations),
             Hint("Usual cars: bounce at 1 to 1.5 Hz, damping ratios 0.2 to 0.4, wheel hop at 10 to 14 Hz."),
-            *_iri_blocks(now, ever),
+            Section("Standard error of the IRI because of the car [%]", [
+                Table(("at km/h", *(f"{3.6 * speed:.0f}" for speed in now)), [
+                    ("any car of this wheelbase", *(f"{100 * value:.0f}" for value in ever.values())),
+                    ("this car", *(f"{100 * value:.1f}" for value in now.values()))])]),
             Lines([*_kept_lines(errors), _mass_line(question, mass), *_warnings(problem, car, values, deviations),
                    *missing, *unknown, *moved, *misfits])])
     comments = "".join(f"# {line}\n".replace("# \n", "#\n") for line in [
@@ -439,7 +439,6 @@ def _unseen_errors(knowledge: CarKnowledge, unseen: Sequence[tuple[DriveSpectra,
 
 
 def _shown(name: str, coordinate: float) -> float:
-
     return share_of(coordinate) if name == "rear_share" else float(np.exp(coordinate))
 
 
@@ -470,14 +469,6 @@ def _table(values: Mapping[str, float], deviations: Mapping[str, float]) -> Tabl
     return Table(("", "front", "rear"), [
         *((_with_unit(name), cells[f"front.{name}"], cells[f"rear.{name}"]) for name in by_axle),
         *((_with_unit(name), "", cells[name]) for name in cells if "." not in name)])
-
-
-def _iri_blocks(now: Mapping[float, float], ever: Mapping[float, float]) -> list[Block]:
-    return [
-        Section("Standard error of the IRI because of the car [%]", [
-            Table(("at km/h", *(f"{3.6 * speed:.0f}" for speed in now)), [
-                ("any car of this wheelbase", *(f"{100 * value:.0f}" for value in ever.values())),
-                ("this car", *(f"{100 * value:.1f}" for value in now.values()))])])]
 
 
 def _kept_lines(errors: Mapping[str, Any]) -> Iterator[str]:
@@ -603,6 +594,3 @@ def _charts(problem: UnknownCar, car: LearnedCar) -> Iterator[Chart]:
             lines.append(Line(name, f_hz[seen], (road + noise)[group].mean(axis=0)[seen]))
         yield Curves(f"Spectra at {3.6 * low:.0f} to {3.6 * high:.0f} km/h", "frequency [Hz]",
                      "power spectral density [(m/s2)2/Hz]", tuple(lines), log_x=True, log_y=True)
-
-
-learn_car = function("learn_car", LearnCarQuestion, learned)

@@ -170,15 +170,15 @@ class ConvertQuestion(LogsQuestion):
 
 
 _TABLES = f"{' '.join(FORMATS)} (in SI units)"
-SECTIONS = Verb(SectionsQuestion, "logger.api.sections:sections_of", (Out(
+SECTIONS = Verb(SectionsQuestion, "logger.api.sections:sections", (Out(
     f"write the sections as {_TABLES}, or a page or picture of them (.html .png .svg .pdf); may repeat",
     metavar="FILE", others=FORMATS),))
-PASSES = Verb(PassesQuestion, "logger.api.passes:combined", (
+PASSES = Verb(PassesQuestion, "logger.api.passes:passes", (
     Out(f"write the means as {_TABLES}, or a page with map and curves (.html) or picture (.png .svg .pdf); may repeat",
         metavar="FILE", others=FORMATS),
     Out("write the work list: waypoints (.gpx), or one of the formats of --out", "--visit", "FILE", FORMATS,
         many=False, is_drawn=False)))
-CONVERT = Verb(ConvertQuestion, "logger.api.conversion:converted")
+CONVERT = Verb(ConvertQuestion, "logger.api.conversion:convert")
 
 
 BY = ("segment", "section", "cell", "route")
@@ -277,10 +277,10 @@ class ReportQuestion(FleetQuestion):
     out: Annotated[Path | str, Option("folder to write", metavar="DIR", read=Path)]
 
 
-INGEST = Verb(IngestQuestion, "logger.api.fleet:ingested")
-SUMMARISE = Verb(SummariseQuestion, "logger.api.fleet:summarised", (Out(
+INGEST = Verb(IngestQuestion, "logger.api.fleet:fleet_ingest")
+SUMMARISE = Verb(SummariseQuestion, "logger.api.fleet:fleet_summarise", (Out(
     f"write all rows as {' '.join(FORMATS)}", metavar="FILE", others=FORMATS, many=False, is_drawn=False),))
-REPORT = Verb(ReportQuestion, "logger.api.fleet:reported")
+REPORT = Verb(ReportQuestion, "logger.api.fleet:fleet_report")
 FLEET = Verbs('''Combine many cars over years: logs into a dataset, figures of its roads and cars, and a map of them.
 
   ridelog fleet ingest /media/RIDELOG --to county --car "van 7"

@@ -15,7 +15,7 @@ from typing import Any, ClassVar
 import numpy as np
 import numpy.typing as npt
 
-from logger.api.drive_questions import ModesCommand, ModesQuestion
+from logger.api.drive_questions import ModesQuestion
 from logger.api.drives import read_run
 from logger.api.shown import CommandResult, Shown, table
 from logger.api.vehicles import Model, model_of
@@ -50,7 +50,7 @@ _ONLY_DECAYS = ("era", "decrement")
 class Modes(CommandResult):
     """Natural frequencies, damping ratios and shapes of m modes, slowest first, at c channels.
 
-    channels              names of those
+    channels              names of those; of a vehicle alone there are none
     frequency_hz          (m,) natural frequencies without regard to damping, ``frequency_std_hz`` (m,) their standard
                           deviations [Hz]
     damping_ratio         (m,) shares of critical damping, ``damping_std`` (m,) likewise; NaN where it cannot be
@@ -82,19 +82,12 @@ class Modes(CommandResult):
             Line("poles", self.poles[:, 1], self.poles[:, 0], dots=True),))]
 
 
-def modes_of(question: ModesQuestion) -> Modes:
-    """The answer to ``ModesQuestion``, which says what is raised."""
-    return _modes_by(found_modes(question.record, question), Path(question.named()).name or "record")
-
-
-modes = function("modes", ModesQuestion, modes_of)
-
-
-def asked_modes(question: ModesCommand) -> CommandResult:
-    """What the terminal asked: modes of a record, or of a vehicle alone."""
-    if question.vehicle is not None and question.record is None:
+@function(ModesQuestion)
+def modes(question: ModesQuestion) -> Modes:
+    if question.record is None:
+        assert question.vehicle is not None
         return vehicle_modes(model_of(question.vehicle), speed_mps=question.speed_mps or COMMON_SPEED_MPS)
-    return modes_of(question)
+    return _modes_by(found_modes(question.record, question), Path(question.named()).name or "record")
 
 
 def _modes_by(found: Found, name: str) -> Modes:
@@ -110,24 +103,9 @@ def _modes_by(found: Found, name: str) -> Modes:
         tuple((one.frequency_hz, one.reason) for one in result.rejected), result.how, result.order, pole_rows(result))
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class VehicleModes(CommandResult):
-    """Vibrations of a vehicle with its effects, m of them, slowest first.
-
-    frequency_hz, damping_ratio           (m,) as in ``Modes``
-    frequency_std_hz, damping_std         (m,) by the standard errors of the vehicle's numbers; NaN where they are not
-                                          known
-    """
-
-    frequency_hz: Array
-    frequency_std_hz: Array
-    damping_ratio: Array
-    damping_std: Array
-
-
 def vehicle_modes(
     vehicle: Model | Path | str, iri_m_per_km: float = COMMON_IRI, speed_mps: float = COMMON_SPEED_MPS
-) -> VehicleModes:
+) -> Modes:
     """Natural frequencies and damping ratios of a vehicle with its effects, which laws that are not linear have on a
     road of this roughness at this speed.
 
@@ -155,7 +133,8 @@ def vehicle_modes(
     at = f", at {speed_mps:g} m/s on a road of {iri_m_per_km:g} m/km" if known.depends_on_motion else ""
     rows = list(zip(*(one.tolist() for one in columns), strict=True))
     content = Blocks([Lines([f"{model.vehicle.name}{at}"]), Table(_HEADS, list(_mode_rows(rows)))])
-    return VehicleModes(content, {"modes": [_mode_json(*row) for row in rows]}, *columns)
+    return Modes(content, {"modes": [_mode_json(*row) for row in rows]}, (), *columns,
+                 np.empty((len(rows), 0), complex), (), "eigenvalues of the vehicle", 0, np.empty((0, 3)))
 
 
 def found_modes(given: record_checks.ChannelRecord | Path | str, question: ModesQuestion) -> Found:
@@ -164,7 +143,8 @@ def found_modes(given: record_checks.ChannelRecord | Path | str, question: Modes
         return modes_of_drive(given, question)
     if question.speed_mps is not None:
         raise question.wrong("speed_mps", ": expected `vehicle` with it")
-    _check(question)
+    if question.input_column is not None and question.method not in (None, "n4sid"):
+        raise question.wrong("input_column", f": expected `method` n4sid with it, found {question.method}")
     _check_stands(given, question)
     record, inputs = _asked(given, question)
     try:
@@ -182,13 +162,6 @@ def _check_stands(given: record_checks.ChannelRecord | Path | str, question: Mod
             f"{name_of(given)}: expected `vehicle` with a drive: the road, and the second axle that "
             "follows the first, add peaks to its spectrum that are not modes. A stretch of free decay can be "
             "analysed with `method` era")
-
-
-def _check(question: ModesQuestion) -> None:
-    """WrongOption for an option that the method has no use for."""
-    method = question.method
-    if question.input_column is not None and method not in (None, "n4sid"):
-        raise question.wrong("input_column", f": expected `method` n4sid with it, found {method}")
 
 
 def _asked(given: record_checks.ChannelRecord | Path | str, question: ModesQuestion

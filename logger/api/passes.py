@@ -101,8 +101,8 @@ class RepeatedDrives(CommandResult):
         return passes_page(self._found)
 
 
-def combined(question: PassesQuestion) -> RepeatedDrives:
-    """The answer to ``PassesQuestion``, which says what is raised."""
+@function(PassesQuestion)
+def passes(question: PassesQuestion) -> RepeatedDrives:
     since, until, places = question.since, question.until, question.places
     first_us, end_us, split_us = map(day_us, (since, until, question.split))
     above_m_per_km = question.above_m_per_km or FAIR_TO_IN_PER_MI * INCH_PER_MILE_M_PER_KM
@@ -121,9 +121,6 @@ def combined(question: PassesQuestion) -> RepeatedDrives:
         Blocks([*blocks(found), Lines(left_out_lines(left))]), as_json(found) | left_out_json(left),
         found.iri.drives, found.iri.iri_m_per_km, found.iri.iri_std_m_per_km,
         found.a_w_mps2, found.lat_deg, found.lon_deg, found.heading_deg, found)
-
-
-passes = function("passes", PassesQuestion, combined)
 
 
 @dataclass(frozen=True, eq=False)
@@ -318,13 +315,6 @@ def _visit_cells(found: CombinedDrives, one: PlaceToVisit) -> tuple[str, ...]:
             "" if a_w is None else comfort_words(values["comfort"]), f"{one.confidence:.0%}", str(one.drives))
 
 
-def _change_cells(found: CombinedDrives, change: Changes, one: int, cell: int) -> tuple[str, ...]:
-    """A change as words, from its direction on."""
-    return (compass(float(found.heading_deg[cell])),
-            f"{change.change_m_per_km[one]:+.2f} ± {change.change_std_m_per_km[one]:.2f}", f"{change.p_value[one]:.1g}",
-            str(change.before[one]), str(change.after[one]))
-
-
 def _change_blocks(found: CombinedDrives, change: Changes) -> Iterator[Block]:
     """What changed between two periods: how much of the road, and the largest changes."""
     if not len(change.key):
@@ -340,8 +330,10 @@ def _change_blocks(found: CombinedDrives, change: Changes) -> Iterator[Block]:
                  "& Hochberg)"])
     cells = np.searchsorted(found.iri.key, change.key).tolist()
     yield Table(_CHANGE_HEADS, [
-        (place_number(found, cells[one]), words[one], _place(found, cells[one]),
-         *_change_cells(found, change, one, cells[one])) for one in largest_changes(change)], (0, 1, 2, 3))
+        (next((str(number) for number, visit in enumerate(found.visits, start=1) if cells[one] in visit.cells), ""),
+         words[one], _place(found, cells[one]), compass(float(found.heading_deg[cells[one]])),
+         f"{change.change_m_per_km[one]:+.2f} ± {change.change_std_m_per_km[one]:.2f}", f"{change.p_value[one]:.1g}",
+         str(change.before[one]), str(change.after[one])) for one in largest_changes(change)], (0, 1, 2, 3))
     yield Hint("Place: its number in the work list, which combines both periods.")
 
 
@@ -357,11 +349,6 @@ def largest_changes(change: Changes) -> list[int]:
     sure = np.flatnonzero(change.false_share <= SIGNIFICANT)
     order = sure[np.argsort(-np.abs(change.change_m_per_km[sure]), kind="stable")]
     return list(map(int, order[:MOST_CHANGES]))
-
-
-def place_number(found: CombinedDrives, cell: int) -> str:
-    """The number of the place to visit that a cell belongs to; nothing where there is none."""
-    return next((str(number) for number, one in enumerate(found.visits, start=1) if cell in one.cells), "")
 
 
 def compass(heading_deg: float) -> str:

@@ -138,8 +138,8 @@ class Comfort(CommandResult):
                    log_x=True)]
 
 
-def comfort_of(question: ComfortQuestion) -> Comfort:
-    """The answer to ``ComfortQuestion``, which says what is raised."""
+@function(ComfortQuestion)
+def comfort(question: ComfortQuestion) -> Comfort:
     used, record = weighting_named(question.weighting), question.record
     name = "record" if isinstance(record, record_file.AccelerationRecord) else str(
         record.path if isinstance(record, drive_file.Drive) else record)
@@ -161,9 +161,6 @@ def comfort_of(question: ComfortQuestion) -> Comfort:
                    vertical.a_w_mps2, vertical.mtvv_mps2, vertical.vdv_mps175, vertical.crest_factor,
                    summary["comfort"], found.weighted_mps2, ride.rate_hz,
                    tuple(doubt.words for doubt in ride.doubts))
-
-
-comfort = function("comfort", ComfortQuestion, comfort_of)
 
 
 def _facts_of(record: Given) -> RecordFacts:

@@ -92,14 +92,11 @@ def write_profile(path: Path | str, profile: Profile) -> None:
     drive_file.write_profile(Path(path), drive_file.track_of(profile))
 
 
-def random_road_of(question: RandomRoadQuestion) -> Profile:
-    """The answer to ``RandomRoadQuestion``, which says what is raised."""
+@function(RandomRoadQuestion)
+def random_road(question: RandomRoadQuestion) -> Profile:
     elevation_m = generate(roughness_of(question), question.length_m, question.spacing_m, question.seed,
                            question.waviness)
     return Profile(0.0, question.spacing_m, elevation_m, None)
-
-
-random_road = function("random_road", RandomRoadQuestion, random_road_of)
 
 
 def roughness_of(question: RandomRoadQuestion) -> float:
@@ -149,8 +146,8 @@ class Iri(CommandResult):
             *road.charts()]
 
 
-def iri_of(question: IriQuestion) -> Iri:
-    """The answer to ``IriQuestion``, which says what is raised."""
+@function(IriQuestion)
+def iri(question: IriQuestion) -> Iri:
     name, road = _named(question.profile, question.resample_m)
     localized_m_per_km = question.localized_m_per_km
     try:
@@ -171,9 +168,6 @@ def iri_of(question: IriQuestion) -> Iri:
     return Iri(Blocks(content), values, whole["iri_m_per_km"],
                whole.get("iri_right_m_per_km"), whole.get("mri_m_per_km"), whole.get("hri_m_per_km"),
                road.start_m + np.array(ends_m), shown[1:], road, rough)
-
-
-iri = function("iri", IriQuestion, iri_of)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -211,8 +205,8 @@ class RoadClass(CommandResult):
                        log_x=True, log_y=True)]
 
 
-def road_class_of(question: ClassifyQuestion) -> RoadClass:
-    """The answer to ``ClassifyQuestion``, which says what is raised."""
+@function(ClassifyQuestion)
+def classify(question: ClassifyQuestion) -> RoadClass:
     name, road = _named(question.profile, question.resample_m)
     profile_file.check_road(road, name)
     tracks = [one for one in (road.elevation_m, road.elevation_right_m) if one is not None]
@@ -224,9 +218,6 @@ def road_class_of(question: ClassifyQuestion) -> RoadClass:
     return RoadClass("\n".join(class_lines(found, road, Path(name).name)), class_json(found), left.road_class,
                      left.gd_n0_cm3, left.gd_n0_std_cm3, left.waviness, left.waviness_std, found[0].iri_m_per_km,
                      left.bands)
-
-
-classify = function("classify", ClassifyQuestion, road_class_of)
 
 
 def _named(profile: profile_file.Wheelpaths | Path | str, resample_m: float | None) -> tuple[str, Profile]:

@@ -89,8 +89,8 @@ class Sections(CommandResult):
         return layer.Layer("sections", FIELDS, tuple(feature for one in self._drives for feature in _features(one)))
 
 
-def sections_of(question: SectionsQuestion) -> Sections:
-    """The answer to ``SectionsQuestion``, which says what is raised."""
+@function(SectionsQuestion)
+def sections(question: SectionsQuestion) -> Sections:
     length_m, route, places = length_of(question.length), question.route, question.places
     units = question.units or ("us" if str(question.length).endswith(("mi", "ft")) else "si")
     localized_m_per_km = question.localized_m_per_km
@@ -109,9 +109,6 @@ def sections_of(question: SectionsQuestion) -> Sections:
         _joined([one.edges_m[:-1] for one in figures]), _joined([one.ends_m for one in drives]), known_m, iri, std, a_w,
         speed_mps, np.array([word for one in drives for word in one.condition], dtype=np.str_), drives,
         UNITS[units])
-
-
-sections = function("sections", SectionsQuestion, sections_of)
 
 
 def _on_route(files: Sequence[LoggedFile], path: Path | str, length_m: float) -> Iterator[DriveSections]:

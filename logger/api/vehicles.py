@@ -278,8 +278,8 @@ class Calibration(CommandResult):
             for name, one in (("roads", self.iri_per_accel_rms), ("windows", self.window_iri_per_accel_rms))))]
 
 
-def calibration_of(question: CalibrateQuestion) -> Calibration:
-    """The answer to ``CalibrateQuestion``, which says what is raised."""
+@function(CalibrateQuestion)
+def calibrate(question: CalibrateQuestion) -> Calibration:
     vehicle = question.vehicle
     path = None if isinstance(vehicle, Model) else vehicle_path(str(vehicle))
     found = calibrated(vehicle if isinstance(vehicle, Model) else vehicle_file.read_model(str(path)), path, question)
@@ -288,9 +288,6 @@ def calibration_of(question: CalibrateQuestion) -> Calibration:
         Blocks(blocks(found)), as_json(found), found, np.array([one.speed_mps for one in speeds]),
         *(_slopes(speeds, name) for name in (
             "iri_per_accel_rms", "window_iri_per_accel_rms", "accel_rms_per_root_gd", "a_w_per_iri")))
-
-
-calibrate = function("calibrate", CalibrateQuestion, calibration_of)
 
 
 def _slopes(speeds: Sequence[SpeedCalibration], name: str) -> Slopes:

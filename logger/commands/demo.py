@@ -34,10 +34,9 @@ from logger.report.quantities import columns, wrapped
 
 if TYPE_CHECKING:
     from logger.api.extraction import Extracted
-    from logger.api.lab.loop import Say
+    from logger.api.lab.loop import Say, Story
     from logger.chart_data import Curves
     from logger.estimation.batch import Assessment
-    from logger.lab.session import Story
 
 
 REPORT_NAME, DUMP_NAME = "report.html", "drive.dump.gz"
@@ -101,9 +100,8 @@ def car(out: Path, unpack_only: bool, as_json: bool) -> None:
     """Write drives of a car that nobody measured into ``out``, and learn it as ``ridelog learn-car`` does."""
     import numpy as np
 
-    from logger.api.drives import write_run
+    from logger.api.drives import simulate, write_run
     from logger.api.roads import random_road
-    from logger.api.simulation import simulate
     from logger.api.vehicles import read_vehicle
     from logger.vehicle.published_cars import NUMBERS, coordinates_of
 

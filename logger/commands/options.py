@@ -220,7 +220,8 @@ def run(verb: Verb, args: argparse.Namespace) -> int:
         with respelled(verb.question):
             question = asked(verb, args)
             _check_outs(paths, question)
-            found = named(verb.answers)(question)
+            answers = named(verb.answers)
+            found = getattr(answers, "answer", answers)(question)
     except CheckFailed as refusal:
         if not (verb.refusal and args.json):
             raise

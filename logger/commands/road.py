@@ -39,7 +39,7 @@ def run(args: argparse.Namespace) -> int:
 
 def _generate(args: argparse.Namespace) -> int:
     """A profile goes to stdout where no file is named, and what was made to stderr."""
-    from logger.api.roads import random_road_of, roughness_of
+    from logger.api.roads import random_road, roughness_of
     from logger.roads.iri import iri
     from logger.roads.iso8608 import road_class
 
@@ -47,7 +47,7 @@ def _generate(args: argparse.Namespace) -> int:
         raise BadInput("--json: expected --out FILE with it, as stdout holds the JSON")
     with options.respelled(RandomRoadQuestion):
         question: RandomRoadQuestion = options.asked(GENERATE, args)
-    road, gd_n0_cm3 = random_road_of(question), roughness_of(question)
+    road, gd_n0_cm3 = random_road.answer(question), roughness_of(question)
     made = {
         "class": road_class(gd_n0_cm3), "gd_n0_cm3": gd_n0_cm3, "waviness": question.waviness, "seed": question.seed,
         "iri_m_per_km": iri(road.elevation_m, road.spacing_m), "spacing_m": road.spacing_m,

@@ -161,13 +161,13 @@ def lines(study: "Study", result: "Result") -> list[str]:
 
 def _table_lines(table: "Table") -> list[str]:
     """Columns as wide as what is in them; headings, and words where the line would be too long, are broken."""
-    cells = [[column.text(cell) for column, cell in zip(table.columns, row, strict=True)] for row in table.rows]
-    widths = [max(max((len(row[index]) for row in cells), default=0), max(map(len, column.name.split())))
-              for index, column in enumerate(table.columns)]
+    cells, names = table.texts, table.heads
+    widths = [max(max((len(row[index]) for row in cells), default=0), max(map(len, name.split())))
+              for index, name in enumerate(names)]
     left = [index in table.words for index in range(len(widths))]
     while sum(widths) + 2 * len(widths) > _WIDTH and max(widths) > _NARROWEST:
         widths[widths.index(max(widths))] -= 1
-    heads = _broken([column.name for column in table.columns], widths, lowest=True)
+    heads = _broken(names, widths, lowest=True)
     return ["  ".join(f"{cell:<{width}}" if words else f"{cell:>{width}}"
                       for cell, width, words in zip(row, widths, left, strict=True)).rstrip()
             for rows in (heads, *(_broken(row, widths) for row in cells)) for row in rows]
@@ -187,7 +187,7 @@ def as_json(study: "Study", result: "Result") -> dict[str, Any]:
     return {
         "study": study.called, **{key: value for key, value in _in_short(study).items() if key != "name"},
         "how": study.how, "source": study.source, "failure": study.differs(result) or None,
-        "tables": [{"title": table.title, "columns": [column.name for column in table.columns],
+        "tables": [{"title": table.title, "columns": table.heads,
                     "rows": [[_known(cell) for cell in row] for row in table.rows]} for table in result.all_tables],
         "verdict": result.verdict,
         "figures": [{**_figure(one.chart), "printed": one.printed or None} for one in result.pictures],

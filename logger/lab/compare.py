@@ -25,7 +25,7 @@ from logger.lab.likelihood.whittle import DISCREPANCY
 from logger.lab.residual_tests import run_residual_tests
 from logger.lab.residual_tests.tests import ResidualEvidence, ResidualTestResult, ResidualTestResults
 from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown
-from logger.lab.residuals.removed import Removed, removed_from
+from logger.lab.residuals.unexplained import Removed, removed_from
 from logger.lab.selection.holdout import AS_FILED, REFITTED, ErrorStep, cross_validate
 from logger.lab.selection.starts import fitted_from_starts
 from logger.runs import normalised_rms_error, signal_errors

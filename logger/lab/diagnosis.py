@@ -36,10 +36,8 @@ from logger.lab.likelihood.standard_errors import StandardErrors, deviations_fro
 from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.residuals.breakdown import ModelResiduals
 from logger.lab.residuals.fitted_laws import FittedCar, fitted_car
-from logger.lab.residuals.noise_colour import coloured_noise
-from logger.lab.residuals.removed import Removed, removed_from
 from logger.lab.residuals.road_coherence import best_linear_share
-from logger.lab.residuals.unexplained import Shape, shape_of
+from logger.lab.residuals.unexplained import Removed, Shape, coloured_noise, removed_from, shape_of
 from logger.lab.selection.candidate_fit import CandidateFit, chance_of
 from logger.lab.selection.detectability import Undetectable, effect_as_moved, undetectable_effects
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION, INDISTINGUISHABLE

@@ -16,7 +16,7 @@ from typing import Any
 
 _HOMES = {
     "logger.api.conversion": "Conversion convert",
-    "logger.api.drives": "Estimate Run estimate make_run read_run write_run",
+    "logger.api.drives": "Estimate Run estimate make_run read_run simulate write_run",
     "logger.api.fleet": "FleetReport FleetSummary Ingested fleet_ingest fleet_report fleet_summarise",
     "logger.api.identify.answer": "Identification identify",
     "logger.api.lab.compare": "AddedEffect Comparison ShiftedNumber add_effect compare",
@@ -29,7 +29,6 @@ _HOMES = {
     "logger.api.rides": "Comfort Record comfort read_record",
     "logger.api.roads": "Iri Profile RoadClass classify iri random_road read_profile write_profile",
     "logger.api.lab.diagnose": "Candidate Diagnosis SameRoadDiagnosis diagnose diagnose_same_road",
-    "logger.api.simulation": "simulate",
     "logger.api.sections": "Sections sections",
     "logger.api.vehicles": "Calibration EffectInfo Effects Model Slopes calibrate read_vehicle vehicles write_vehicle",
     "logger.errors": "BadInput",

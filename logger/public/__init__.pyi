@@ -6,6 +6,7 @@ from logger.api.drives import Run as Run
 from logger.api.drives import estimate as estimate
 from logger.api.drives import make_run as make_run
 from logger.api.drives import read_run as read_run
+from logger.api.drives import simulate as simulate
 from logger.api.drives import write_run as write_run
 from logger.api.fleet import FleetReport as FleetReport
 from logger.api.fleet import FleetSummary as FleetSummary
@@ -58,7 +59,6 @@ from logger.api.roads import read_profile as read_profile
 from logger.api.roads import write_profile as write_profile
 from logger.api.sections import Sections as Sections
 from logger.api.sections import sections as sections
-from logger.api.simulation import simulate as simulate
 from logger.api.vehicles import Calibration as Calibration
 from logger.api.vehicles import EffectInfo as EffectInfo
 from logger.api.vehicles import Effects as Effects

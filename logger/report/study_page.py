@@ -77,20 +77,18 @@ def index(known: Sequence[Study], carried: Mapping[str, Carried], share: float =
         doc.heading("Studies: printed results, recomputed",
                     "Each printed item has a verdict on how ours compares with it."),
         doc.paragraphs(_quick(share)), doc.tiles(tile for tile in counts if tile[1] != "0"),
-        *(_contents(title, part, carried) for title, part in zip(titles, parts, strict=True) if part)],
+        *(doc.section(title, doc.grid(("printed", "study", "word", "because", "time"), [
+            row for one in part for row in _rows(one, carried.get(one.called))], range(4)))
+          for title, part in zip(titles, parts, strict=True) if part)],
         style=_INDEX_STYLE)
-
-
-def _contents(title: str, part: Sequence[Study], carried: Mapping[str, Carried]) -> doc.Html:
-    rows = [row for one in part for row in _rows(one, carried.get(one.called))]
-    return doc.section(title, doc.grid(("printed", "study", "word", "because", "time"), rows, range(4)))
 
 
 def _rows(study: Study, found: Carried | None) -> list[tuple[str, doc.Html, str, str, str]]:
     """A row for each word and reason of a study; its time stands in the first."""
     seconds = f"{found.seconds:.1f} s" if found is not None else "-"
     by_source = "" if study.source == DISSERTATION else f" ({study.source})"
-    return [(_joined(names) + by_source, _link(study, found), _word(item, found), _because(study, item, found),
+    because = f"Needs {study.data}: ridelog study {study.called} DIR." if found is None else found.failure
+    return [(_joined(names) + by_source, _link(study, found), _word(item, found), because or item.because,
              "" if place else seconds) for place, (names, item) in enumerate(study.groups)]
 
 
@@ -100,12 +98,6 @@ def _word(item: Item, found: Carried | None) -> str:
     return _FAILED if found.failure else str(item.word)
 
 
-def _because(study: Study, item: Item, found: Carried | None) -> str:
-    if found is None:
-        return f"Needs {study.data}: ridelog study {study.called} DIR."
-    return found.failure or item.because
-
-
 def _link(study: Study, found: Carried | None) -> doc.Html:
     if found is None or found.result is None:
         return doc.html("{}", study.title)
@@ -113,6 +105,7 @@ def _link(study: Study, found: Carried | None) -> doc.Html:
 
 
 def _table(table: Table) -> doc.Html:
-    rows = [[_joined(column.text(cell).split(", ")) if column.name in _UNBROKEN else column.text(cell)
-             for column, cell in zip(table.columns, row, strict=True)] for row in table.rows]
-    return doc.section(table.title, doc.grid([column.name for column in table.columns], rows, table.words))
+    heads = table.heads
+    rows = [[_joined(cell.split(", ")) if head in _UNBROKEN else cell for head, cell in zip(heads, row, strict=True)]
+            for row in table.texts]
+    return doc.section(table.title, doc.grid(heads, rows, table.words))

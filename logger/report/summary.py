@@ -16,6 +16,7 @@ from typing import Any
 
 from logger.comfort.iso2631 import COMFORT_WORDS
 from logger.geodesy import apart_m
+from logger.printable import counted
 from logger.records import WindowRecord
 from logger.roads.iso8608 import CLASS_GD_N0_CM3, iri_from_gd_n0
 from logger.store.log.log_reader import along_m, end_utc_us, iso_utc, length_m, split_drives, utc
@@ -186,16 +187,12 @@ def _roughest(records: Sequence[WindowRecord]) -> tuple[RoughWindow, ...]:
                   if record.iri_m_per_km is not None and not _DOUBTFUL.intersection(record.flags)]
     found: list[RoughWindow] = []
     for place in sorted(candidates, key=lambda place: -place.iri_m_per_km):
-        if all(_apart_m(place, other) >= nearest_m for other in found):
+        if all((abs(place.along_m - other.along_m) if (ground_m := apart_m(place, other)) is None else ground_m)
+               >= nearest_m for other in found):
             found.append(place)
             if len(found) == most:
                 break
     return tuple(found)
-
-
-def _apart_m(one: RoughWindow, other: RoughWindow) -> float:
-    ground_m = apart_m(one, other)
-    return abs(one.along_m - other.along_m) if ground_m is None else ground_m
 
 
 _EIGHTHS = " ▏▎▍▌▋▊▉█"
@@ -204,7 +201,8 @@ _EIGHTHS = " ▏▎▍▌▋▊▉█"
 def screen(summary: DriveSummary, encoding: str) -> str:
     """The lines a person reads after a drive; bars of plain signs where ``encoding`` has no finer ones."""
     drawn = _can_encode(_EIGHTHS, encoding)
-    lines = [_headline(summary)]
+    lines = [f"{counted(summary.drives, 'drive')}, {distance_words(summary.distance_m)} in "
+             f"{span_words(summary.duration_s)} · {date_words(summary)}"]
     values = [
         "" if summary.mean_iri_m_per_km is None else f"mean IRI {summary.mean_iri_m_per_km:.1f} m/km",
         "" if summary.a_w_mps2 is None else f"comfort a_w {summary.a_w_mps2:.2f} m/s²",
@@ -274,11 +272,6 @@ def iri_words(place: RoughWindow) -> str:
     """The IRI of a place with its standard error: ``14.2 ± 2.1``."""
     error = "" if place.iri_std_m_per_km is None else f" ± {place.iri_std_m_per_km:.1f}"
     return f"{place.iri_m_per_km:.1f}{error}"
-
-
-def _headline(summary: DriveSummary) -> str:
-    what = "1 drive" if summary.drives == 1 else f"{summary.drives} drives"
-    return f"{what}, {distance_words(summary.distance_m)} in {span_words(summary.duration_s)} · {date_words(summary)}"
 
 
 def _bars(shares: Sequence[Share], words_of: Callable[[str], str], drawn: bool) -> list[str]:

@@ -13,13 +13,14 @@ better, then what agrees. An item without any check is not reproducible.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from importlib import import_module
 from math import inf, isfinite
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -182,27 +183,29 @@ class Workload:
         self.progress(len(items), len(items))
 
 
-@dataclass(frozen=True)
-class Column:
-    """A column of a table: its heading, with the unit in brackets, and how its numbers are written."""
-
-    name: str
-    form: str = ".4g"
-
-    def text(self, cell: Cell) -> str:
-        """A cell as a person reads it; a dash where there is nothing."""
-        if cell is None:
-            return "-"
-        return cell if isinstance(cell, str) else format(cell, self.form)
+_FORM = re.compile(r" (\+?\.\d[efg%])$")
 
 
 @dataclass(frozen=True)
 class Table:
-    """Rows of cells (a word, a number, None for nothing) under columns; columns of the print say ``printed``."""
+    """Rows of cells (a word, a number, None for nothing) under columns; columns of the print say ``printed``. A column
+    is its heading, with the unit in brackets, and how its numbers are written, if not as .4g: "speed [km/h] .1f"."""
 
     title: str
-    columns: tuple[Column, ...]
+    columns: Sequence[str]
     rows: tuple[tuple[Cell, ...], ...]
+
+    @property
+    def heads(self) -> list[str]:
+        """Headings of the columns."""
+        return [_FORM.sub("", one) for one in self.columns]
+
+    @property
+    def texts(self) -> list[list[str]]:
+        """The rows as a person reads them; a dash where there is nothing."""
+        forms = [found[1] if (found := _FORM.search(one)) else ".4g" for one in self.columns]
+        return [["-" if cell is None else cell if isinstance(cell, str) else format(cell, form)
+                 for cell, form in zip(row, forms, strict=True)] for row in self.rows]
 
     @property
     def words(self) -> tuple[int, ...]:
@@ -232,35 +235,27 @@ class Result:
     def all_tables(self) -> tuple[Table, ...]:
         """The checks first, where there are any: numbers, statements, and the print beside itself."""
         numbers = [one for one in self.values if isinstance(one, Value)]
-        shown = (("Printed and ours", [one for one in numbers if not one.of_print]),
-                 ("The publication against its own figures", [one for one in numbers if one.of_print]))
-        tables = [_of_numbers(title, some) for title, some in shown if some]
+        tables = [_of_checks(title, ("value", "printed .6g", f"{ours} .6g", "difference +.3g", "tolerance .3g"), some,
+                             lambda one: (one.name, one.printed, one.ours, one.difference, one.tolerance))
+                  for title, ours, of_print in (("Printed and ours", "ours", False),
+                                                ("The publication against its own figures", "as published", True))
+                  if (some := [one for one in numbers if one.of_print is of_print])]
         if statements := [one for one in self.values if isinstance(one, Statement)]:
-            tables.insert(min(1, len(tables)), _of_statements(statements))
+            tables.insert(min(1, len(tables)), _of_checks(
+                "Printed in words, and ours", ("printed", "figure", "ours", "true for"), statements,
+                lambda one: (one.printed, one.name, one.ours, one.bounds)))
         return (*tables, *self.tables)
 
 
-def _of_numbers(title: str, values: Sequence[Value]) -> Table:
-    ours = "as published" if values[0].of_print else "ours"
-    rows: tuple[tuple[Cell, ...], ...] = tuple((one.name, *_items(one, values), one.printed, one.ours, one.difference,
-                                                one.tolerance, _stands(one)) for one in values)
-    return Table(title, (Column("value"), *_of(values), Column("printed", ".6g"), Column(ours, ".6g"), Column(
-        "difference", "+.3g"), Column("tolerance", ".3g"), Column("word")), rows)
-
-
-def _of_statements(statements: Sequence[Statement]) -> Table:
-    rows: tuple[tuple[Cell, ...], ...] = tuple(
-        (one.printed, *_items(one, statements), one.name, one.ours, one.bounds, _stands(one)) for one in statements)
-    return Table("Printed in words, and ours", (Column("printed"), *_of(statements), Column("figure"), Column(
-        "ours", ".4g"), Column("true for"), Column("word")), rows)
-
-
-def _of(checks: Sequence[Check]) -> tuple[Column, ...]:
-    return (Column("of"),) if any(one.of for one in checks) else ()
-
-
-def _items(check: Check, checks: Sequence[Check]) -> tuple[str, ...]:
-    return (", ".join(check.of),) if any(one.of for one in checks) else ()
+def _of_checks(title: str, heads: Sequence[str], checks: Sequence[Check], cells: Callable[[Any], tuple[Cell, ...]]
+               ) -> Table:
+    """Checks in rows, with the items that each is about, where these are said, and how it stands."""
+    said = any(len(one.of) for one in checks)
+    rows: list[tuple[Cell, ...]] = []
+    for one in checks:
+        first, *others = cells(one)
+        rows.append((first, *[", ".join(one.of)] * said, *others, _stands(one)))
+    return Table(title, (heads[0], *["of"] * said, *heads[1:], "word"), tuple(rows))
 
 
 def _stands(check: Check) -> str:

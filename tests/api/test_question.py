@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import ridelog
-from logger.api.drive_questions import ModesCommand, ModesQuestion, RandomRoadQuestion
+from logger.api.drive_questions import ModesQuestion, RandomRoadQuestion
 from logger.commands import options
 from logger.commands.main import ASKED
 from logger.errors import BadInput
@@ -109,7 +109,10 @@ def test_of_two_switches_one_would_be_lost() -> None:
 
 
 def test_the_function_has_the_questions_fields_and_words() -> None:
-    ride = function("ride", Ask, lambda one: one)
+    @function(Ask)
+    def ride(question: Ask) -> Ask:
+        return question
+
     assert ride(Path("a.csv"), tries=2) == Ask(Path("a.csv"), tries=2)
     assert list(inspect.signature(ride).parameters) == [*(one.name for one in askings(Ask)), "notify"]
     assert ride.__name__ == "ride" and "samples a second (10 to 1000 Hz; default: 100)" in str(ride.__doc__)
@@ -139,13 +142,16 @@ def test_a_function_is_found_where_it_stands() -> None:
     ((Path("a.csv"), 3), {}, r"ride\(\) too many positional arguments"),
     ((), {}, r"ride\(\) missing a required argument: 'road'")])
 def test_python_names_the_function(values: tuple[Any, ...], options: dict[str, Any], words: str) -> None:
-    ride: Any = function("ride", Ask, lambda one: one)
+    @function(Ask)
+    def ride(question: Ask) -> Ask:
+        return question
+
     with pytest.raises(TypeError, match=f"^{words}"):
         ride(*values, **options)
 
 
-def test_what_the_terminal_adds_takes_no_help_away() -> None:
-    assert help_of(ModesCommand) == help_of(ModesQuestion) and "ridelog modes push.csv" in help_of(ModesQuestion)
+def test_the_terminal_shows_the_help_without_the_part_on_python() -> None:
+    assert "ridelog modes push.csv" in help_of(ModesQuestion) and "In Python" not in help_of(ModesQuestion)
     assert "default: ." not in "".join(one.help for _, one in every_option())
 
 

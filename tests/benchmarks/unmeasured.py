@@ -15,7 +15,7 @@ import numpy as np
 
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.unknown_road.diagnosis import UnknownRoadDiagnosis, diagnose_same_road
-from logger.lab.unknown_road.likelihood import SameRoad
+from logger.lab.unknown_road.same_road import SameRoad
 from logger.profiles.track import Track
 from logger.runs import Run
 from logger.store.formats.drive_file import read_drive

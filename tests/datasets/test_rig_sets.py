@@ -11,7 +11,7 @@ import pytest
 from scipy.io import savemat
 from scipy.signal import chirp
 
-from logger.api.rig_sets import columns_in
+from logger.api.data_sets import columns_in
 from logger.api.rigs import emps, silverbox
 from logger.commands.main import main
 from logger.errors import BadInput

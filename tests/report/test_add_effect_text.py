@@ -8,8 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from logger.api.lab.compare import addition_json, bias, errors, judgement, moved_blocks
-from logger.lab.residuals.removed import Removed
-from logger.lab.residuals.sensor_drift import OFFSET, Drift
+from logger.lab.residuals.unexplained import OFFSET, Drift, Removed
 from logger.lab.selection.add_effect import AddedEffects, Number
 from logger.report.blocks import Table
 from logger.store.formats.effect_file import shipped_effects

@@ -14,8 +14,7 @@ from logger.lab.likelihood.noise_floor import NoiseLevel
 from logger.lab.residual_tests import run_residual_tests
 from logger.lab.residual_tests.tests import ResidualEvidence
 from logger.lab.residuals.breakdown import breakdown
-from logger.lab.residuals.removed import Removed
-from logger.lab.residuals.unexplained import Shape, spatial_line_of
+from logger.lab.residuals.unexplained import Removed, Shape, spatial_line_of
 from logger.lab.selection.detectability import Undetectable
 from logger.lab.selection.holdout import AS_FILED, JUDGED_ON, REFITTED, ErrorStep
 from logger.report.blocks import text

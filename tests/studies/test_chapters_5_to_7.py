@@ -11,7 +11,7 @@ import pytest
 from logger.chart_data import Field
 from logger.estimation.rms_calibration import rms_relation
 from logger.roads.iri import iri
-from logger.studies.dissertation import chapter_5, chapter_6
+from logger.studies.dissertation import chapter_6, chapters_5_and_7
 from logger.studies.drives import (
     PS_2119,
     Conditions,
@@ -92,8 +92,8 @@ def test_the_sizes_that_are_asked_for_give_the_printed_words() -> None:
 def test_a_tube_lifts_a_tires_mean_by_its_area_over_the_patch() -> None:
     """The raised cosine's area is half of height times width."""
     place_m = np.arange(19.8, 20.2, 1e-5)
-    area = float(np.sum(chapter_5.tube(20.0)(place_m)) * 1e-5)
-    assert area / rav4().contact_patch_m == pytest.approx(chapter_5.TUBE_M**2 / 2 / 0.25, rel=1e-3)
+    area = float(np.sum(chapters_5_and_7.tube(20.0)(place_m)) * 1e-5)
+    assert area / rav4().contact_patch_m == pytest.approx(chapters_5_and_7.TUBE_M**2 / 2 / 0.25, rel=1e-3)
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ import pytest
 
 from logger.chart_data import Field
 from logger.modal import five_storey
-from logger.studies.dissertation import chapter_4, chapter_5, chapter_6
+from logger.studies.dissertation import chapter_4, chapter_6, chapters_5_and_7
 from logger.studies.drives import BUMP_MPS, Conditions, bump, record_of, until, without_profile
 
 from ..support.study_results import study_result
@@ -44,10 +44,10 @@ def test_other_printed_values() -> None:
     assert [limit for *_, limit in chapter_4.PRINTED_T4_3] == pytest.approx(
         [0.5386 * gd**0.5 for _, gd, _ in chapter_4.PRINTED_T4_3], abs=0.01)
     measured, model = (np.array(one) for one in (five_storey.PRINTED_MEASURED_HZ, five_storey.PRINTED_MODEL_HZ))
-    printed = chapter_5.PRINTED_ERROR_PERCENT
+    printed = chapters_5_and_7.PRINTED_ERROR_PERCENT
     # 1.88 % is 2.548 to 2.500 over 2.548; 7.29 % is over the measured value, too.
     assert 100 * np.abs(model / measured - 1) == pytest.approx(printed, abs=0.02)
-    assert chapter_5.PRINTED_HZ[1:] == five_storey.PRINTED_MEASURED_HZ[1:]
+    assert chapters_5_and_7.PRINTED_HZ[1:] == five_storey.PRINTED_MEASURED_HZ[1:]
 
 
 def test_vibrations_agree_with_the_print() -> None:

@@ -5,7 +5,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from logger.lab.unknown_road.likelihood import response_of
+from logger.lab.unknown_road.same_road import response_of
 from logger.runs import Signal
 from logger.shipped import vehicle_file
 from logger.simulation.virtual_drive import recorded_signals

@@ -12,12 +12,12 @@ from pathlib import Path
 
 import numpy as np
 
-from logger.api.road_sets import DrivenWindows, RoadRecording, driven_windows, expected_files, from_folder
+from logger.api.data_sets import DrivenWindows, RoadRecording, driven_windows, expected_files, from_folder
 from logger.chart_data import Array, Curves, Line
 from logger.errors import BadInput
 from logger.geodesy import east_and_north_m
 from logger.roads.iso8608 import iri_class
-from logger.studies.study import Column, Item, Picture, Result, Study, Table, Word, Workload
+from logger.studies.study import Item, Picture, Result, Study, Table, Word, Workload
 
 _CAR = "rav4-2009"
 _WINDOW_M = 25.0
@@ -34,16 +34,14 @@ def run(folder: Path, effort: Workload) -> Result:
     if not len(known):
         raise BadInput(f"{log}: expected a drive of 100 m or more at a steady speed, found no window with an IRI")
     tables = [Table(f"Rows of {_WINDOW_M:g} m", (
-        Column("from [m]", ".0f"), Column("to [m]", ".0f"), Column("latitude [deg]", ".6f"),
-        Column("longitude [deg]", ".6f"), Column("speed [m/s]", ".1f"), Column("class"), Column("IRI [m/km]", ".2f"),
-        Column("std. error [m/km]", ".2f")), rows)]
+        "from [m] .0f", "to [m] .0f", "latitude [deg] .6f", "longitude [deg] .6f", "speed [m/s] .1f", "class",
+        "IRI [m/km] .2f", "std. error [m/km] .2f"), rows)]
     words = (f"{len(known)} of {len(rows)} rows of {_WINDOW_M:g} m have an IRI, {known.mean():.2f} m/km on average, "
              f"{known.min():.2f} to {known.max():.2f}. No profiler measured this road, so nothing shows whether that "
              "is right.")
     speed = _speeds(log, recording)
     if speed is not None:
-        tables.append(Table("The receiver's speed against the car's", (
-            Column("figure"), Column("read before", ".3g"), Column("ours", ".3g")), speed))
+        tables.append(Table("The receiver's speed against the car's", ("figure", "read before .3g", "ours .3g"), speed))
     return Result(tuple(tables), words, (Picture(_map(drives)),))
 
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from logger.api import road_sets
+from logger.api import data_sets
 from logger.arrays import Array
 from logger.errors import BadInput
 from logger.extraction.along_track import ASIDE_M, MeasuredLine
@@ -58,8 +58,8 @@ class ProfiledRoad:
 
 def run(folder: Path, effort: Workload) -> Result:
     """As ``from_folder`` calls it."""
-    files = road_sets.expected_files(folder, "platoon_*.hdf5", "the cars' records AutoPi_CAN/platoon_CPH1_HH.hdf5")
-    parts: list[road_sets.Compared] = []
+    files = data_sets.expected_files(folder, "platoon_*.hdf5", "the cars' records AutoPi_CAN/platoon_CPH1_HH.hdf5")
+    parts: list[data_sets.Compared] = []
     refused: list[str] = []
     repeats: list[Any] = []
     for file in files:
@@ -67,19 +67,19 @@ def run(folder: Path, effort: Workload) -> Result:
         whole, left = recordings(file)
         refused += left
         passes = effort.some(whole, 1) if whole else []
-        found, left = road_sets.each_pass(passes, lambda one, road=road: _windows(  # type: ignore[misc]
+        found, left = data_sets.each_pass(passes, lambda one, road=road: _windows(  # type: ignore[misc]
             one, effort.vehicle or _CAR, road), effort.progress)
         refused += left
         parts += [_beside(road, [one for moved, one in found if moved == moves and one.window_m == window_m], window_m,
-                          moves) for window_m in road_sets.WINDOWS_M for moves in (False, True) if found]
-        repeats += [row for window_m in road_sets.WINDOWS_M for row in _repeats(road, window_m)]
+                          moves) for window_m in data_sets.WINDOWS_M for moves in (False, True) if found]
+        repeats += [row for window_m in data_sets.WINDOWS_M for row in _repeats(road, window_m)]
     if not parts:
         raise BadInput(f"{folder}: expected a pass that can be used, found none; {refused[0]}")
-    tables = [road_sets.compared_table(parts, window_m) for window_m in road_sets.WINDOWS_M]
-    tables.append(Table("The profilers against each other", road_sets.REPEAT_COLUMNS, tuple(repeats)))
-    pictures = tuple(Picture(road_sets.along(one)) for one in parts if one.window_m == road_sets.WINDOWS_M[-1]
+    tables = [data_sets.compared_table(parts, window_m) for window_m in data_sets.WINDOWS_M]
+    tables.append(Table("The profilers against each other", data_sets.REPEAT_COLUMNS, tuple(repeats)))
+    pictures = tuple(Picture(data_sets.along(one)) for one in parts if one.window_m == data_sets.WINDOWS_M[-1]
                      and one.what == "car")
-    return Result(tuple(tables), road_sets.verdict_of(parts, refused, _CEILING), pictures)
+    return Result(tuple(tables), data_sets.verdict_of(parts, refused, _CEILING), pictures)
 
 
 _CEILING = ("The profilers against each other are the ceiling: no car can agree better with one of them than the other "
@@ -89,7 +89,7 @@ _CEILING = ("The profilers against each other are the ceiling: no car can agree 
 # --- files ---
 
 
-def recordings(file: Path) -> tuple[list[road_sets.RoadRecording], list[str]]:
+def recordings(file: Path) -> tuple[list[data_sets.RoadRecording], list[str]]:
     """The passes of a file, and a line for each that lacks a signal. Raises BadInput for a file that is not of this
     layout, or where HDF5 cannot be read."""
     try:
@@ -113,7 +113,7 @@ def recordings(file: Path) -> tuple[list[road_sets.RoadRecording], list[str]]:
         raise BadInput(f"{file}: expected an HDF5 file, found {error}") from None
 
 
-def _recording(name: str, group: Any) -> road_sets.RoadRecording:
+def _recording(name: str, group: Any) -> data_sets.RoadRecording:
     def signal(key: str, columns: int) -> Array:
         found = np.asarray(group[key][()], dtype=np.float64) if key in group else np.empty(0)
         if found.ndim != 2 or found.shape[1] < columns or len(found) < 2:
@@ -124,7 +124,7 @@ def _recording(name: str, group: Any) -> road_sets.RoadRecording:
     accel, gps, speed = signal("acc.xyz", 4), signal("gps", 3), signal("spd_veh", 2)
     inside = (gps[:, 0] >= speed[0, 0]) & (gps[:, 0] <= speed[-1, 0])
     gps = gps[inside]
-    return road_sets.RoadRecording(name, accel[:, 0], accel[:, 1:4], road_sets.unit_by_gravity(accel[:, 1:4]),
+    return data_sets.RoadRecording(name, accel[:, 0], accel[:, 1:4], data_sets.unit_by_gravity(accel[:, 1:4]),
                                    gps[:, 0],
                      np.interp(gps[:, 0], speed[:, 0], speed[:, 1] * KMH_MPS), gps[:, 1], gps[:, 2])
 
@@ -135,7 +135,7 @@ def profiled_road(folder: Path, cars: Path) -> ProfiledRoad:
     if named is None:
         raise BadInput(f"{cars}: expected a name like platoon_CPH1_HH.hdf5")
     route, side = (one.lower() for one in named.groups())
-    iri, places = (road_sets.expected_files(folder, f"{route}_{what}_{side}.csv",
+    iri, places = (data_sets.expected_files(folder, f"{route}_{what}_{side}.csv",
                                             f"the profiler's {what} of {cars.name}")[0]
                    for what in ("iri_mpd_rut", "zp"))
     begin_m, left, right = _columns(iri, "Distance [m]", "IRI (5) [m/km]", "IRI (21) [m/km]")
@@ -180,36 +180,36 @@ def _aran(path: Path, line: MeasuredLine) -> tuple[Array, Array]:
 # --- the car, and one profiler beside the other ---
 
 
-def _windows(recording: road_sets.RoadRecording, vehicle: str,
-             road: ProfiledRoad) -> list[tuple[bool, road_sets.DrivenWindows]]:
+def _windows(recording: data_sets.RoadRecording, vehicle: str,
+             road: ProfiledRoad) -> list[tuple[bool, data_sets.DrivenWindows]]:
     """Of each time that the pass goes over the profiled road, with windows where its cells are; once more, True beside
     it, moved along to where cells of 10 m fit best."""
     model = read_model(vehicle_path(vehicle))
-    found: list[tuple[bool, road_sets.DrivenWindows]] = []
-    runs = [one for run in road_sets.runs_of(recording, vehicle)
-            for one in road_sets.on_line(run, road.line, float(road.edges_m[0]))]
+    found: list[tuple[bool, data_sets.DrivenWindows]] = []
+    runs = [one for run in data_sets.runs_of(recording, vehicle)
+            for one in data_sets.on_line(run, road.line, float(road.edges_m[0]))]
     edges_m = road.edges_m - road.edges_m[0]
     for run in runs:
-        if not (each := road_sets.windows_of(run, model, (_FINE_M, *road_sets.WINDOWS_M))):
+        if not (each := data_sets.windows_of(run, model, (_FINE_M, *data_sets.WINDOWS_M))):
             continue
         fine, *placed = each
         driven = (edges_m[:-1] >= fine.begin_m[0]) & (edges_m[1:] <= fine.end_m[-1])
         shift_m = best_shift_m(np.append(fine.begin_m, fine.end_m[-1]), fine.iri_m_per_km, edges_m[:-1][driven],
                                edges_m[1:][driven], road.iri_m_per_km[driven], _MOST_SHIFT_M)
-        moved = road_sets.windows_of(replace(run, distance_m=run.distance_m - shift_m), model)
+        moved = data_sets.windows_of(replace(run, distance_m=run.distance_m - shift_m), model)
         found += [(False, one) for one in placed] + [(True, one) for one in moved]
     if not found:
         raise BadInput("expected a pass over the profiled road, found none")
     return found
 
 
-def _beside(road: ProfiledRoad, drives: list[road_sets.DrivenWindows], window_m: float,
-            moved: bool) -> road_sets.Compared:
+def _beside(road: ProfiledRoad, drives: list[data_sets.DrivenWindows], window_m: float,
+            moved: bool) -> data_sets.Compared:
     begin_m, end_m, iri, std = (np.concatenate([getattr(one, name) for one in drives]) for name in (
         "begin_m", "end_m", "iri_m_per_km", "iri_std_m_per_km"))
     edges_m = road.edges_m - road.edges_m[0]
     theirs = mean_between(edges_m, road.iri_m_per_km, begin_m, end_m)
-    return road_sets.Compared(road.name, window_m, begin_m, iri, std, theirs, "car, moved along to fit" if moved
+    return data_sets.Compared(road.name, window_m, begin_m, iri, std, theirs, "car, moved along to fit" if moved
                               else "car")
 
 
@@ -217,14 +217,14 @@ def _repeats(road: ProfiledRoad, window_m: float) -> list[tuple[Any, ...]]:
     begin_m = np.arange(road.edges_m[0], road.edges_m[-1] - window_m + 1, window_m)
     left, right = (mean_between(road.edges_m, one, begin_m, begin_m + window_m)
                    for one in (road.left_m_per_km, road.right_m_per_km))
-    rows = [road_sets.repeat_row(road.name, f"P79, right track against left, {window_m:g} m", right, left)]
+    rows = [data_sets.repeat_row(road.name, f"P79, right track against left, {window_m:g} m", right, left)]
     if road.aran_m is not None and road.aran_m_per_km is not None and len(road.aran_m) > 2:
         theirs, cells = matching_cells(road.edges_m[:-1], road.iri_m_per_km, road.aran_m, road.aran_m_per_km,
                                        _MOST_CELLS)
         known = np.where(np.isfinite(theirs), road.iri_m_per_km, np.nan)
         both = (mean_between(road.edges_m, theirs, begin_m, begin_m + window_m),
                 mean_between(road.edges_m, known, begin_m, begin_m + window_m))
-        rows.append(road_sets.repeat_row(road.name, f"ARAN against P79, {window_m:g} m", *both, moved_m=_CELL_M
+        rows.append(data_sets.repeat_row(road.name, f"ARAN against P79, {window_m:g} m", *both, moved_m=_CELL_M
                                          * cells))
     return rows
 
@@ -236,6 +236,6 @@ STUDY = Study(
     "on the profiler's cells by GPS, then moved by up to 30 m to where they fit best. The parameters of the cars "
     "(Renault Zoe) are not published: the model of a sedan replaces them, unless --vehicle names another. The reader "
     "is tested on small files of the same layout.",
-    road_sets.from_folder("LiRA-CD", _DOWNLOAD, run), (Item("LiRA-CD", Word.NOT_REPRODUCIBLE, road_sets.NOT_RUN),),
+    data_sets.from_folder("LiRA-CD", _DOWNLOAD, run), (Item("LiRA-CD", Word.NOT_REPRODUCIBLE, data_sets.NOT_RUN),),
     source="Skar et al., LiRA-CD, Data in Brief, 2023", data=f"LiRA-CD ({_DOWNLOAD})")
 STUDIES = (STUDY,)

@@ -15,14 +15,14 @@ from pathlib import Path
 
 import numpy as np
 
-from logger.api.road_sets import REPEAT_COLUMNS, WINDOWS_M, expected_files, from_folder, repeat_row
+from logger.api.data_sets import REPEAT_COLUMNS, WINDOWS_M, expected_files, from_folder, repeat_row
 from logger.bounds import DISTANCE, LATITUDE, LONGITUDE, SIGNAL
 from logger.chart_data import Array, Curves, Line
 from logger.errors import BadInput
 from logger.extraction.along_track import ASIDE_M, MeasuredLine
 from logger.files import read_bounded
 from logger.roads.repeated_drives import best_shift_m, matching_cells, mean_between
-from logger.studies.study import Column, Item, Picture, Result, Study, Table, Word, Workload
+from logger.studies.study import Item, Picture, Result, Study, Table, Word, Workload
 
 PASSES = ("trip_iri_1ccf", "trip_iri_85e7", "trip_iri_e9ef")
 _COLUMNS = ("timestamp", "value", "lat", "lng")
@@ -68,7 +68,7 @@ def run(folder: Path, effort: Workload) -> Result:
         ours.append([row[3] for row in rows if isinstance(row[3], float)])
         off_m_per_km.append(max(row[8] for row in rows if isinstance(row[8], float)))
     squared = [float(np.mean([row[7] for row in table.rows if row[1] == _PIECEWISE])) for table in tables]
-    columns = (Column("pass"), Column("length [km]", ".2f"), Column("mean IRI [m/km]", ".3f"))
+    columns = ("pass", "length [km] .2f", "mean IRI [m/km] .3f")
     length = Table("The passes", columns, tuple(
         (one.name, float(np.ptp(one.edges_m)) / 1000, float(one.iri_m_per_km.mean())) for one in passes))
     spans = [f"{min(one):.3f} to {max(one):.3f}" for one in ours]

@@ -14,7 +14,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 
-from logger.api import road_sets
+from logger.api import data_sets
 from logger.arrays import Array
 from logger.errors import BadInput
 from logger.geodesy import EARTH_RADIUS_M
@@ -54,8 +54,8 @@ class LaserRoad:
 def run(folder: Path, effort: Workload) -> Result:
     """As ``from_folder`` calls it."""
     roads = laser_roads(folder)
-    trips = [trip(one) for one in road_sets.expected_files(folder, "*-2019-*.mat", "the phones' trips")]
-    found: list[tuple[str, road_sets.DrivenWindows]] = []
+    trips = [trip(one) for one in data_sets.expected_files(folder, "*-2019-*.mat", "the phones' trips")]
+    found: list[tuple[str, data_sets.DrivenWindows]] = []
     refused: list[str] = []
     elsewhere: list[str] = []
     pairs = effort.some([(road, one) for road in roads for one in trips], 1)
@@ -64,31 +64,28 @@ def run(folder: Path, effort: Workload) -> Result:
             line = Path(scratch) / f"profile-{number}.csv"
             road.write(line)
             mine = [one for each, one in pairs if each is road]
-            windows, left = road_sets.each_pass(mine, lambda one,
-                                                line=line: road_sets.driven_windows(  # type: ignore[misc]
+            windows, left = data_sets.each_pass(mine, lambda one,
+                                                line=line: data_sets.driven_windows(  # type: ignore[misc]
                 one, effort.vehicle or _CAR, profile=line), effort.progress)
             found += [(road.name, one) for one in windows]
             elsewhere += [one for one in left if _OFF in one]
             refused += [one for one in left if _OFF not in one]
-    parts = [part for road in roads for window_m in road_sets.WINDOWS_M
+    parts = [part for road in roads for window_m in data_sets.WINDOWS_M
              if (part := _together(road.name, window_m, found)) is not None]
     if not parts:
         raise BadInput(f"{folder}: expected trips on the profiled roads, found none; {(refused + elsewhere)[0]}")
-    tables = tuple(road_sets.compared_table(parts, window_m) for window_m in road_sets.WINDOWS_M)
-    return Result(tables, road_sets.verdict_of(parts, refused, _ceiling()),
-                  tuple(Picture(road_sets.along(one)) for one in parts if one.window_m == road_sets.WINDOWS_M[-1]))
-
-
-def _ceiling() -> str:
-    spans = [f"{low:.2f} to {high:.2f} per {window_m:g} m" for window_m, (low, high) in road_sets.REPEAT_R2.items()]
-    return ("The set holds one profile of each road, no repeat; passes of another profiler repeat each other with R2 "
-            f"{' and '.join(spans)} (lira-map).")
+    tables = tuple(data_sets.compared_table(parts, window_m) for window_m in data_sets.WINDOWS_M)
+    spans = [f"{low:.2f} to {high:.2f} per {window_m:g} m" for window_m, (low, high) in data_sets.REPEAT_R2.items()]
+    ceiling = ("The set holds one profile of each road, no repeat; passes of another profiler repeat each other with "
+               f"R2 {' and '.join(spans)} (lira-map).")
+    return Result(tables, data_sets.verdict_of(parts, refused, ceiling),
+                  tuple(Picture(data_sets.along(one)) for one in parts if one.window_m == data_sets.WINDOWS_M[-1]))
 
 
 def laser_roads(folder: Path) -> list[LaserRoad]:
     """The three roads. Raises BadInput and FileNotFoundError."""
-    return [_laser_road(name, road_sets.expected_files(folder, elevation, "the laser profiles")[0], half,
-                        road_sets.expected_files(folder, places, "their places")[0])
+    return [_laser_road(name, data_sets.expected_files(folder, elevation, "the laser profiles")[0], half,
+                        data_sets.expected_files(folder, places, "their places")[0])
             for name, elevation, half, places in _ROADS]
 
 
@@ -115,7 +112,7 @@ def _laser_road(name: str, elevation: Path, half: int, places: Path) -> LaserRoa
     return LaserRoad(name, spacing_m, elevation_m, *(np.interp(at_m, along_m, one) for one in (lat_deg, lon_deg)))
 
 
-def trip(file: Path) -> road_sets.RoadRecording:
+def trip(file: Path) -> data_sets.RoadRecording:
     """A phone's record. Raises BadInput."""
     columns = read_arrays(file, _TRIP)
     if len(set(map(len, columns))) > 1:
@@ -126,19 +123,19 @@ def trip(file: Path) -> road_sets.RoadRecording:
     fixed = (np.abs(lat_deg) > 1e-6) & np.isfinite(lat_deg + lon_deg + speed_mps)
     second = np.floor((time_s - time_s[0]) / _FIX_S)
     kept = np.flatnonzero(fixed)[np.unique(second[fixed], return_index=True)[1]]
-    return road_sets.RoadRecording(file.stem, time_s, accel, road_sets.unit_by_gravity(accel), time_s[kept],
+    return data_sets.RoadRecording(file.stem, time_s, accel, data_sets.unit_by_gravity(accel), time_s[kept],
                                    speed_mps[kept], lat_deg[kept],
                      lon_deg[kept])
 
 
 def _together(road: str,
-              window_m: float, found: list[tuple[str, road_sets.DrivenWindows]]) -> road_sets.Compared | None:
+              window_m: float, found: list[tuple[str, data_sets.DrivenWindows]]) -> data_sets.Compared | None:
     chosen = [one for name, one in found if name == road and one.window_m == window_m]
     if not chosen:
         return None
     begin_m, iri, std, exact = (np.concatenate([getattr(one, name) for one in chosen]) for name in (
         "begin_m", "iri_m_per_km", "iri_std_m_per_km", "exact_m_per_km"))
-    return road_sets.Compared(road, window_m, begin_m, iri, std, exact)
+    return data_sets.Compared(road, window_m, begin_m, iri, std, exact)
 
 
 _DOWNLOAD = "download doi 10.5281/zenodo.4386256 (CC0) and unpack it into one folder"
@@ -148,7 +145,7 @@ STUDY = Study(
     "phone's positions and then by the road that the car felt. Then estimate compares its windows with the profile's "
     "exact IRI. The cars' parameters are not published: the model of a sedan replaces them, unless --vehicle names "
     "another. The reader is tested on small files of the same layout.",
-    road_sets.from_folder("Zenodo 4386256", _DOWNLOAD, run),
-    (Item("Zenodo 4386256", Word.NOT_REPRODUCIBLE, road_sets.NOT_RUN),),
+    data_sets.from_folder("Zenodo 4386256", _DOWNLOAD, run),
+    (Item("Zenodo 4386256", Word.NOT_REPRODUCIBLE, data_sets.NOT_RUN),),
     source="Botshekan et al., Zenodo 4386256, 2021", data=f"Zenodo 4386256 ({_DOWNLOAD})")
 STUDIES = (STUDY,)

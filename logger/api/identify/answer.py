@@ -54,7 +54,7 @@ from logger.identification.unknown_road.marginal_likelihood import Options as Ro
 from logger.identification.unknown_road.road_fit import RoadFit, fit_roads
 from logger.lab.likelihood.priors import UNUSUAL_SIGMA
 from logger.lab.readings_fit import ReadingsFit, fit_to_readings
-from logger.left_out import LeftOut, left_out_json, left_out_lines
+from logger.left_out import left_out_json, left_out_lines
 from logger.profiles.track import Track
 from logger.question import function
 from logger.report.blocks import Blocks, Lines, Table
@@ -153,7 +153,8 @@ class Identification(CommandResult):
         vehicle_file.write_model(path, self.model, "".join(f"{line}\n" for line in comments))
 
 
-def answer(question: IdentifyQuestion) -> Identification:
+@function(IdentifyQuestion)
+def identify(question: IdentifyQuestion) -> Identification:
     """The numbers. BadInput and ``NotIdentifiable`` as ``IdentifyQuestion`` says."""
     model, given = model_of(question.vehicle), each(question.runs)
     if not given:
@@ -173,9 +174,6 @@ def answer(question: IdentifyQuestion) -> Identification:
     if question.road != MEASURED:
         return _on_unmeasured_roads(model, records, question)
     return _on_measured_roads(model, records, _narrowed(question, drives))
-
-
-identify = function("identify", IdentifyQuestion, answer)
 
 
 def refusal_json(refusal: CheckFailed) -> dict[str, Any]:
@@ -256,10 +254,12 @@ def _on_measured_roads(given: Model, records: list[Record], question: IdentifyQu
     content = Blocks([Lines([*_first_lines(fit, _head(given, len(fit.free), records, low),
                                  "rms(measured - model) / rms(measured)")]),
             _table(fit, fit.free), Lines([*lines, *common_words(model, common), *record_words(found)]),
-            Lines(left_out_lines(_beside_beginnings(records)))])
+            _left_out_lines(records)])
     return Identification(
-        content, measured_json(fit, *checks) | record_json(found, common, records)
-        | left_out_json(runs_left_out(records)), fit, model_of(_fitted(given, model, fit)),
+        content, measured_json(fit, *checks) | {
+            "common_roughness": common.share, "rounding_by_bounds": found.rounded, "moved_m": found.moved_m,
+            "runs": [record.name for record in records], **left_out_json(runs_left_out(records))},
+        fit, model_of(_fitted(given, model, fit)),
         tuple(_in_words_of(records, one) for one in doubts(fit, *checks)))
 
 
@@ -291,9 +291,9 @@ def _in_words_of(records: Sequence[Record], line: str) -> str:
     return line.replace("m/s2", records[0].facts.main.unit)
 
 
-def _beside_beginnings(records: Sequence[Record]) -> tuple[LeftOut, ...]:
+def _left_out_lines(records: Sequence[Record]) -> Lines:
     """What is left out, but the beginnings, which the first line says."""
-    return runs_left_out([replace(one, skip_s=0.0) for one in records])
+    return Lines(left_out_lines(runs_left_out([replace(one, skip_s=0.0) for one in records])))
 
 
 def _check_effects(given: vehicle_file.CarModel, word: str, records: Sequence[Record],
@@ -442,11 +442,13 @@ def _on_unmeasured_roads(given: Model, records: list[Record], question: Identify
     content = Blocks([Lines([*_first_lines(fit, _head(given, len(parameters), records, f"; over {where}", ","),
                                  "rms(residual) / rms(measured) over the most probable road")]),
             _table(fit, parameters), Lines([*unmeasured_lines(fit, parameters)]),
-            Lines(left_out_lines(_beside_beginnings(records)))])
+            _left_out_lines(records)])
+    cannot_tell = [finding.words for finding in fit.verdict]
     return Identification(
-        content, {**unmeasured_json(fit, parameters), "runs": [record.name for record in records],
-                          **left_out_json(runs_left_out(records))}, fit, model_of(model),
-        tuple(finding.words for finding in fit.verdict))
+        content, _fit_json(fit, parameters, fit.names) | {
+            "road": fit.roads, "road_standard_errors": fit.road_errors, "cannot_tell": cannot_tell,
+            "runs": [record.name for record in records], **left_out_json(runs_left_out(records))},
+        fit, model_of(model), tuple(cannot_tell))
 
 
 def _road_fit_errors(fit: RoadFit) -> NumberErrors:
@@ -602,12 +604,6 @@ def record_words(found: ReadingsFit) -> Iterator[str]:
                ", and the standard errors include that uncertainty.")
 
 
-def record_json(found: ReadingsFit, common: CommonRoughness, records: Sequence[Record]) -> dict[str, Any]:
-    """The same as an object."""
-    return {"common_roughness": common.share, "rounding_by_bounds": found.rounded, "moved_m": found.moved_m,
-            "runs": [record.name for record in records]}
-
-
 def _ends(fit: Fit) -> str:
     scale = np.array([fit.standard_errors[one.name] for one in fit.free])
     best = fit.ends[np.argmin(np.abs((fit.ends - np.array(list(fit.parameters.values()))) / scale).max(axis=1))]
@@ -701,13 +697,6 @@ def _least_known(fit: Fit) -> str:
 
 
 _UNITS = {GD_N0: "cm3", NOISE: "m/s2", OFFSET: "m"}
-
-
-def unmeasured_json(fit: RoadFit, free: Sequence[Free]) -> dict[str, Any]:
-    """All of it for a program."""
-    return _fit_json(fit, free, fit.names) | {
-        "road": fit.roads, "road_standard_errors": fit.road_errors,
-        "cannot_tell": [finding.words for finding in fit.verdict]}
 
 
 def unmeasured_lines(fit: RoadFit, free: Sequence[Free]) -> Iterator[str]:

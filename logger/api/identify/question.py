@@ -105,6 +105,6 @@ class IdentifyQuestion(question.LongQuestion):
             raise self.wrong("waviness", ": expected a road that was not measured (`unmeasured_road` or `same_road`)")
 
 
-VERB = question.Verb(IdentifyQuestion, "logger.api.identify.answer:answer", (question.Out(
+VERB = question.Verb(IdentifyQuestion, "logger.api.identify.answer:identify", (question.Out(
     "write the vehicle with the fitted values; FILE.html, .png, .svg, .pdf: pictures of the residual and of correlated "
     "numbers; may repeat", metavar="FILE", others=("*",)),), "logger.api.identify.answer:refusal_json")

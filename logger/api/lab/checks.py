@@ -22,7 +22,7 @@ from logger.dsp.channel_faults import at_ends, goes_against, longest_still
 from logger.dsp.repeated_samples import find_repeats, stretches_of
 from logger.dsp.whole_record import thinned
 from logger.errors import BadInput
-from logger.lab.another_car import AnotherCar, LikeliestRig, another_car, error_with_best_effect, likeliest_rig
+from logger.lab.another_car import LikeliestRig, another_car, error_with_best_effect, likeliest_rig
 from logger.lab.likelihood.lag import SLOWEST_MPS
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.whittle import BLOCK_S, HIGHEST_OF_RATE
@@ -295,7 +295,9 @@ def _another_car(word: str, model: CarModel, runs: SimulatedRuns, predictions: S
     """That the runs are of another car, which explains them as no effect does, and how it differs."""
     mains = [run.main(one) for run, one in zip(runs.runs, predictions, strict=True)]
     found = another_car(runs.runs, model.vehicle, model.effects, mains, numbers)
-    if found is not None and not _explained_by_an_effect(found, model, known, numbers):
+    # An effect in the model's car may explain as much as another car does, and both may have come down to the noise.
+    if found is not None and error_with_best_effect(found.runs, model.vehicle, model.effects, known, numbers) > (
+            1 + ROUNDING) * found.found_error:
         far = list(found.shares.items())[:_NAMED]
         more = f" and {len(found.shares) - _NAMED} more parameters far off" if len(found.shares) > _NAMED else ""
         yield (f"{runs.runs[0].name}: expected a drive of the car in {word}, found one of another car: the file's "
@@ -303,12 +305,6 @@ def _another_car(word: str, model: CarModel, runs: SimulatedRuns, predictions: S
                f"{', '.join(f'{name} {share:+.0%}' for name, share in far)}{more} leaves {found.found_error:.2f}. "
                "Is this the right vehicle file? ridelog identify fits a model's parameters"
                + ("" if COMPILED else "; effects that are forces were not tried, which takes the lab extra"))
-
-
-def _explained_by_an_effect(found: AnotherCar, model: CarModel, known: Mapping[str, Effect], numbers: float) -> bool:
-    """Whether an effect, in the model's car, explains as much as another car does."""
-    error = error_with_best_effect(found.runs, model.vehicle, model.effects, known, numbers)
-    return error <= (1 + ROUNDING) * found.found_error  # both may have come down to the noise
 
 
 def _advice(run: Run, car: Car, band_hz: tuple[float, float]) -> str:

@@ -24,7 +24,6 @@ from logger.identification.noise_models import rms
 from logger.lab.another_car import POOR_ERROR
 from logger.lab.compare import LabComparison, Standing
 from logger.lab.likelihood.whittle import UNEXPLAINED
-from logger.lab.residual_tests.tests import ResidualTestResult
 from logger.lab.residuals.breakdown import ModelResiduals, Part, frequencies, segments
 from logger.lab.residuals.force_state_map import Curve, ForceMap
 from logger.lab.selection.add_effect import BIAS_SIGMA, AddedEffects, Number
@@ -84,12 +83,9 @@ class Comparison(CommandResult):
         return page(f"{self.found.vehicle}: model and measurement", of, self.blocks())
 
 
-def compared(question: CompareQuestion) -> Comparison:
-    """The answer to ``CompareQuestion``, which says what is raised."""
+@function(CompareQuestion)
+def compare(question: CompareQuestion) -> Comparison:
     return comparison_of(bench_with(question, thin=False).compared())  # an error is that of all samples
-
-
-compare = function("compare", CompareQuestion, compared)
 
 
 def comparison_of(found: LabComparison) -> Comparison:
@@ -140,8 +136,8 @@ class AddedEffect(CommandResult):
         self._json["vehicle"] = str(path)
 
 
-def added(question: AddEffectQuestion) -> AddedEffect:
-    """The answer to ``AddEffectQuestion``, which says what is raised."""
+@function(AddEffectQuestion)
+def add_effect(question: AddEffectQuestion) -> AddedEffect:
     bench, starts, candidates, near = bench_with(question), list[Chosen](), 1, None
     for effect, file, values in _all_asked_for(bench, question):
         bench = bench.with_effect(effect, file)
@@ -150,9 +146,6 @@ def added(question: AddEffectQuestion) -> AddedEffect:
         starts.append(begin)
     found = bench.added(starts, candidates, question.progress, near)
     return addition_of(found, model_of(bench.model_with(found)))
-
-
-add_effect = function("add_effect", AddEffectQuestion, added)
 
 
 def _all_asked_for(bench: Bench, question: AddEffectQuestion) -> list[tuple[Effect, str | None, dict[str, float]]]:
@@ -298,7 +291,10 @@ def comparison_json(found: LabComparison) -> dict[str, Any]:
                      "shifts": dict(found.moves), "shifted_far": list(found.far)},
         "repeats": None if found.repeats is None else {
             "runs": list(found.repeats.names), "deviation_mps2": found.repeats.deviation_mps2},
-        "residual_tests": [_test_json(test, test in found.tests_found) for test in found.tests.tests],
+        "residual_tests": [
+            {"name": test.name, "found": test in found.tests_found, "value": known(test.value), "unit": test.unit,
+             "standard_error": known(test.standard_error), "p_value": known(test.p_value)}
+            for test in found.tests.tests],
     }
 
 
@@ -324,11 +320,6 @@ def _part_json(part: Part, unit: str) -> dict[str, Any]:
             "error_power_share": part.share}
 
 
-def _test_json(test: ResidualTestResult, found: bool) -> dict[str, Any]:
-    return {"name": test.name, "found": found, "value": known(test.value), "unit": test.unit,
-            "standard_error": known(test.standard_error), "p_value": known(test.p_value)}
-
-
 _BODY_HZ = 5.0
 _QUIET_DB = -80.0
 _MOST_RUNS = 8
@@ -349,7 +340,9 @@ def comparison_blocks(found: LabComparison) -> Iterator[Block]:
     yield next_step(found)
     yield lab_words.removed_section(found.removed, found.band)
     yield _whole_drives(residuals)
-    yield _worst_place(found.refitted)
+    worst = worst_moment(found.refitted)
+    yield Detail("The worst place", [moment_chart(worst.words, residuals, worst, {
+        "measured": residuals.measured, "residual": residuals.residual, "model": residuals.model})])
     yield Detail("By frequency", spectra(residuals))
     yield from _by_part(found)
     yield _places(found.refitted)
@@ -389,12 +382,6 @@ def _whole_drives(residuals: ModelResiduals) -> Detail:
             ("measured", residuals.measured), ("residual", residuals.residual)))
         drawn.append(Curves(names[run.name], "time [s]", _axis(run), lines))
     return Detail("Each run", drawn)
-
-
-def _worst_place(standing: Standing) -> Detail:
-    residuals, worst = standing.residuals, worst_moment(standing)
-    return Detail("The worst place", [moment_chart(worst.words, residuals, worst, {
-        "measured": residuals.measured, "residual": residuals.residual, "model": residuals.model})])
 
 
 def moment_chart(title: str, residuals: ModelResiduals, at: Moment, signals: Mapping[str, Sequence[Array]]) -> Curves:
@@ -594,13 +581,10 @@ def bias(names: Sequence[str], moved: Sequence[Number]) -> str:
     listed = ", ".join(one.name for one in biased[:_NAMED])
     more = f" and {len(biased) - _NAMED} more" if len(biased) > _NAMED else ""
     worst = biased[0]
-    return (f"Without {together} the refit biased {listed}{more}. {worst.name} came out {_too_much(worst)}, "
+    too_much = (f"{_change(worst.name, worst.found, worst.without)[1:]} too "
+                f"{'high' if worst.without > worst.found else 'low'}")
+    return (f"Without {together} the refit biased {listed}{more}. {worst.name} came out {too_much}, "
             f"{abs(worst.shift):.1f} standard errors from its value with {'it' if len(names) == 1 else 'them'}.")
-
-
-def _too_much(one: Number) -> str:
-    """By how much a number came out wrong without the effects."""
-    return f"{_change(one.name, one.found, one.without)[1:]} too {'high' if one.without > one.found else 'low'}"
 
 
 def _change(name: str, before: float, after: float) -> str:

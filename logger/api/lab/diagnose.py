@@ -33,8 +33,7 @@ from logger.lab.selection.evidence import FALSE_ALARM, IMITATION
 from logger.lab.selection.holdout import JUDGED_ON
 from logger.lab.unknown_road import diagnosis
 from logger.lab.unknown_road.diagnosis import UnknownRoadDiagnosis
-from logger.lab.unknown_road.likelihood import NotOneRoad, SameRoad
-from logger.lab.unknown_road.one_road import placed_by_road
+from logger.lab.unknown_road.same_road import NotOneRoad, SameRoad, placed_by_road
 from logger.left_out import left_out_json, left_out_lines
 from logger.printable import percent
 from logger.profiles.track import Track
@@ -51,7 +50,7 @@ from logger.vehicle.effect import Chosen
 _SHOWN = 8
 _PLACES_EVERY_M = 10.0
 _LEAST_SHARED_M = 50.0
-"""Some seconds of a drive: less road says nothing (``lab.unknown_road.likelihood``)."""
+"""Some seconds of a drive: less road says nothing (``lab.unknown_road.same_road``)."""
 
 
 @dataclass(frozen=True)
@@ -109,17 +108,14 @@ class Diagnosis(CommandResult):
         return self.next_command
 
 
-def diagnosed(question: DiagnoseQuestion) -> Diagnosis:
-    """The answer to ``DiagnoseQuestion``, which says what is raised."""
+@function(DiagnoseQuestion)
+def diagnose(question: DiagnoseQuestion) -> Diagnosis:
     if question.same_road:
         return _diagnosed_same_road(question)
     bench = bench_with(question, None if question.candidates is not None else "ridelog diagnose")
     bench = with_candidates(bench, question.candidates)
     found = bench.diagnosed(question.progress)
     return diagnosis_of(found, bench, None if question.list_all else _SHOWN, _next(question, bench, found))
-
-
-diagnose = function("diagnose", DiagnoseQuestion, diagnosed)
 
 
 def diagnosis_of(found: LabDiagnosis, bench: Bench, most: int | None = None, next_command: str = ""
@@ -239,7 +235,8 @@ def records_of(drives: Sequence[tuple[drive_file.Drive, str]]) -> list[Record]:
         check_record(drive, file, [one for one, _ in drives[:number]])
         check_distances(drive, file)
     by_receiver = any(one.facts.places_by == BY_RECEIVER for one, _ in drives)
-    if any(_counts_for_itself(one) for one, _ in drives) and all(_was_extracted(one) for one, _ in drives):
+    # Extracted without a profile, a drive's distance begins where it did.
+    if all(_was_extracted(one) for one, _ in drives) and any(one.facts.places_by is None for one, _ in drives):
         drives, by_receiver = _on_one_distance(drives), True
     facts = replace(UNKNOWN, places_by=BY_RECEIVER) if by_receiver else UNKNOWN
     return thinned_runs([Record(name, one.rate_hz, one.accel_z_mps2, one.distance_m, one.speed_mps, flat, facts=facts)
@@ -249,11 +246,6 @@ def records_of(drives: Sequence[tuple[drive_file.Drive, str]]) -> list[Record]:
 def _was_extracted(drive: drive_file.Drive) -> bool:
     """Whether a drive was extracted, and has positions."""
     return drive.facts.source is not None and drive.lat_deg is not None and bool(np.isfinite(drive.lat_deg).all())
-
-
-def _counts_for_itself(drive: drive_file.Drive) -> bool:
-    """Whether that was without a profile, so that its distance begins where it did."""
-    return _was_extracted(drive) and drive.facts.places_by is None
 
 
 def _on_one_distance(drives: Sequence[tuple[drive_file.Drive, str]]) -> list[tuple[drive_file.Drive, str]]:
@@ -359,7 +351,8 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
     lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
                            "{} with the vehicle's file unchanged, {} finally, noise floor about {}")
     lines += _faint(found)
-    dropped = [name for name in _on_the_way(found) if name not in found.verdict]
+    tried = [step.words.removeprefix("with ") for step in found.steps if step.words.startswith("with ")]
+    dropped = [name for name in tried if name not in found.verdict]
     if dropped:
         why = ("the effects above explain the same" if found.verdict else
                "its parameter ended at a bound, or at the value where the effect vanishes")
@@ -477,10 +470,6 @@ def _confusion(names: list[str], found: LabDiagnosis) -> str:
     would = "; ".join(drives if len(alike) > 1 else alike)
     return (f"{enumerated(names, 'and')} explain the residual about equally well. To distinguish them: {would}. "
             "ridelog plan predicts whether that would succeed.")
-
-
-def _on_the_way(found: LabDiagnosis) -> list[str]:
-    return [step.words.removeprefix("with ") for step in found.steps if step.words.startswith("with ")]
 
 
 def table(found: LabDiagnosis) -> Iterator[tuple[str, str, str, str]]:

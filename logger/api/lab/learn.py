@@ -19,10 +19,9 @@ from logger.api.shown import CommandResult
 from logger.chart_data import Chart, Curves
 from logger.files import write_text
 from logger.lab.laws.draft import Draft
-from logger.lab.laws.learn import Law, Learning
+from logger.lab.laws.learn import Law, Learning, Nearest
 from logger.lab.laws.learn import learn as learn_law
 from logger.lab.laws.picture import picture
-from logger.lab.laws.refusals import Nearest, Refusal
 from logger.lab.selection.add_effect import AddedEffects, add
 from logger.lab.selection.holdout import JUDGED_ON, ErrorStep
 from logger.plugins import catalogue
@@ -106,8 +105,8 @@ class LearnedLaw(CommandResult):
         return "Next: " + question.command(f"add-effect {'+'.join(names)} {{}} --out with-law.yaml")
 
 
-def law_of(question: LearnQuestion) -> LearnedLaw:
-    """The answer to ``LearnQuestion``, which says what is raised."""
+@function(LearnQuestion)
+def learn(question: LearnQuestion) -> LearnedLaw:
     bench = bench_with(question, "ridelog learn")
     found = learned(bench, question.progress)
     summary = as_json(found.learning, found.addition, None)
@@ -118,9 +117,6 @@ def law_of(question: LearnQuestion) -> LearnedLaw:
         summary["family"], summary["words"], source_of(found.learning, found.addition), summary["parameters"],
         summary["standard_errors"], summary["error_before"], summary["error_after"], summary["error_after_unseen"],
         summary["noise_floor_error"], tuple(summary["verdict"]), () if drawn is None else (drawn,), steps)
-
-
-learn = function("learn", LearnQuestion, law_of)
 
 
 def learned(bench: Bench, notify: Notify = silent) -> LearnedModel:
@@ -178,8 +174,9 @@ def law_learned(law: Law, addition: AddedEffects) -> Chosen:
 
 def why_none(found: Learning) -> str:
     """Why no law is learned."""
-    if found.refused is not None:
-        return _refused(found.refused)
+    if (one := found.refused) is not None:
+        add = "" if one.known is None else f": ridelog add-effect {one.known.one.effect.name}"
+        return f"no law learnt: {one.title} would explain the residual best, but {one.why}{add}"
     if not found.verdict and not found.unexplained:
         return NOTHING
     if not found.verdict:
@@ -190,11 +187,6 @@ def why_none(found: Learning) -> str:
         return (f"no law learnt: {names} explain{'s' * (not many)} part of what is missing, and no law of these "
                 "families explains it better")
     return f"no law learnt: {names} explain{'s' * (not many)} the residual"
-
-
-def _refused(one: Refusal) -> str:
-    add = "" if one.known is None else f": ridelog add-effect {one.known.one.effect.name}"
-    return f"no law learnt: {one.title} would explain the residual best, but {one.why}{add}"
 
 
 def law_blocks(learned: LearnedModel) -> Iterator[Block]:

@@ -28,9 +28,8 @@ from logger.files import make_folder, write_text
 from logger.lab import compare, diagnosis
 from logger.lab.likelihood.posterior import State
 from logger.lab.residuals.breakdown import ModelResiduals, frequencies
-from logger.lab.selection.add_effect import AddedEffects
+from logger.lab.selection.add_effect import AddedEffects, Number, moved_between
 from logger.lab.selection.holdout import JUDGED_ON
-from logger.lab.session import LawSearch, Round, Story
 from logger.question import Notify, function
 from logger.report import document as doc
 from logger.report.blocks import Block, Blocks, Bullets, Hint, Section, Table, page, text
@@ -53,6 +52,60 @@ Progress = Callable[[], AbstractContextManager[Notify]]
 Explain = Callable[[str, str, str], str]
 """What to say under a heading, laid out: of compare, diagnose, learn, add, again or end; with the effect that is
 added, and the vehicle file that is read, or written where an effect is added; of learn the law's file."""
+
+
+@dataclass(frozen=True, eq=False)
+class Round:
+    """Effects that were added, the result, the comparison with them, and the vehicle file that was written."""
+
+    addition: AddedEffects
+    comparison: compare.LabComparison
+    file: str
+
+
+@dataclass(frozen=True, eq=False)
+class Story:
+    """A session, in order.
+
+    first       comparison of the vehicle as it was given
+    diagnoses   at least one
+    refused     effects that a diagnosis found missing and the user did not want
+    law         what was learned where no effect explained what was missing; None: none was looked for
+    law_file    that was written; empty: none
+    """
+
+    first: compare.LabComparison
+    diagnoses: tuple[diagnosis.LabDiagnosis, ...]
+    rounds: tuple[Round, ...]
+    refused: tuple[str, ...]
+    law: learning.LearnedModel | None = None
+    law_file: str = ""
+
+    @property
+    def last(self) -> compare.LabComparison:
+        """Comparison of the vehicle that the session ends with."""
+        return self.rounds[-1].comparison if self.rounds else self.first
+
+    @property
+    def added(self) -> list[str]:
+        """Names of the effects that were added, in order."""
+        return [name for one in self.rounds for name in one.addition.names]
+
+    @property
+    def not_added(self) -> list[str]:
+        """Names of the effects that were found missing last and neither added nor refused: the rounds were used up."""
+        missing = [one.effect.name for one in self.diagnoses[-1].missing]
+        return [name for name in missing if name not in self.added and name not in self.refused]
+
+    @property
+    def floor(self) -> float:
+        """The error that the sensor's noise alone makes."""
+        return (self.rounds[-1].addition if self.rounds else self.diagnoses[-1]).noise_floor_error
+
+    @property
+    def moved(self) -> list[Number]:
+        """The car's numbers without and with the effects; none where nothing was added."""
+        return moved_between(self.rounds[0].addition, self.rounds[-1].addition) if self.rounds else []
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -91,16 +144,13 @@ class LabStory(CommandResult):
         return [chart(falling("NRMSE, model by model", self.steps, self.noise_floor_error))]
 
 
-def story_of(question: LabLoopQuestion) -> LabStory:
-    """The answer to ``LabLoopQuestion``, which says what is raised."""
+@function(LabLoopQuestion)
+def lab(question: LabLoopQuestion) -> LabStory:
     place, bench = Path(question.out), bench_with(question, None if question.candidates is not None else "ridelog lab")
     bench = with_candidates(bench, question.candidates)
     make_ready(bench, place)
     return walk(bench, place, _asking(question.ask), unsaid_lines, lambda: nullcontext(question.progress),
                 learns=lambda: question.learns)
-
-
-lab = function("lab", LabLoopQuestion, story_of)
 
 
 def _asking(ask: Callable[[str], str | None]) -> Ask:
@@ -130,17 +180,12 @@ def make_ready(given: Bench, out: Path, option: str = "") -> None:
         check_out(file, [Path(run.name) for run in given.runs.runs], given.files_read, option)
 
 
-def unexplained(_chapter: str, _effect: str, _vehicle: str) -> str:
-    """No explanation in addition to what is found."""
-    return ""
-
-
 def always() -> bool:
     """A law is to be learned."""
     return True
 
 
-def walk(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progress, explain: Explain = unexplained,
+def walk(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progress, explain: Explain = lambda *_: "",
          learns: Learns = always) -> LabStory:
     """Go through the loop; write the vehicle files and the page into ``out``.
 
@@ -161,7 +206,7 @@ def walk(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progress, exp
         tuple(diagnosing.diagnosis_of(one, given) for one in story.diagnoses),
         tuple(comparing.addition_of(one.addition, read_vehicle(one.file)) for one in story.rounds),
         tuple(comparing.comparison_of(one.comparison) for one in story.rounds), story.refused,
-        Path(story.law.file) if story.law and story.law.file else None, summary["error_before"], summary["error_after"],
+        Path(story.law_file) if story.law_file else None, summary["error_before"], summary["error_after"],
         story.floor, tuple(steps(story)), out / STORY)
 
 
@@ -175,7 +220,7 @@ def go_through(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progres
     diagnoses: list[diagnosis.LabDiagnosis] = []
     rounds: list[Round] = []
     refused: list[str] = []
-    law: LawSearch | None = None
+    law: learning.LearnedModel | None = None
     step = _Step(given, out, notify, progress, explain)
     going = asked = True
     while going and len(rounds) < MOST_ROUNDS:
@@ -206,7 +251,8 @@ def go_through(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progres
             if not same:  # with another effect, what is missing is searched again
                 going = True
                 break
-    return Story(first, tuple(diagnoses), tuple(rounds), tuple(refused), law), step.given.model
+    return Story(first, tuple(diagnoses), tuple(rounds), tuple(refused), law,
+                 str(out / LAW) if law and law.addition else ""), step.given.model
 
 
 @dataclass(frozen=True, eq=False)
@@ -223,12 +269,12 @@ class _Step:
         """An effect added: from where a diagnosis found it, or from where a search for it ends (None)."""
         file = _vehicle_file(self.out, number)
         self.notify(chapter(f"Add {name}", self.explain("add", name, str(file))))
-        begin, near = start or _searched(self.given, name, self.progress)
         with self.progress() as notify:
+            begin, near = start or self.given.search_values(self.given.effects[name], {}, notify)
             addition = self.given.added([begin], len(begin.effect.trials()), notify, near)
         return self._with(addition, name, file)
 
-    def learned(self) -> tuple[_Step, LawSearch, list[Round]]:
+    def learned(self) -> tuple[_Step, learning.LearnedModel, list[Round]]:
         """A law learned, written and added, with what is missing beside it; or none."""
         file = self.out / LAW
         self.notify(chapter("Learn a law", self.explain("learn", "", str(file))))
@@ -236,7 +282,7 @@ class _Step:
             found = learning.learned(self.given, notify)
         self.notify([text(learning.law_blocks(found))])
         if found.addition is None:
-            return self, LawSearch(found.learning, None, None, ""), []
+            return self, found, []
         write_text(file, learning.source_of(found.learning, found.addition))
         self.notify(["", f"Law: {file}"])
         knows, addition = learning.with_law(self.given, found.addition, file)
@@ -244,7 +290,7 @@ class _Step:
         vehicle = _vehicle_file(self.out, 1)
         self.notify(chapter(f"Add {name}", self.explain("add", name, str(vehicle))))
         step, made = replace(self, given=knows)._with(addition, name, vehicle)
-        return step, LawSearch(found.learning, found.addition, learning.picture_of(found), str(file)), [made]
+        return step, found, [made]
 
     def _with(self, addition: AddedEffects, name: str, file: Path) -> tuple[_Step, Round]:
         """The vehicle with what was added written and compared."""
@@ -260,11 +306,6 @@ class _Step:
 
 def _vehicle_file(out: Path, number: int) -> Path:
     return out / f"vehicle-{number}.yaml"
-
-
-def _searched(given: Bench, name: str, progress: Progress) -> _Begin:
-    with progress() as notify:
-        return given.search_values(given.effects[name], {}, notify)
 
 
 def _diagnosed(given: Bench, left_out: frozenset[str], progress: Progress) -> diagnosis.LabDiagnosis:
@@ -331,7 +372,7 @@ def as_json(story: Story) -> dict[str, Any]:
         "steps": [{"step": words, "error": error} for words, error in models],
         "effects": [{"effect": one.effect.name, "parameters": dict(one.values)} for one in story.last.effects],
         "biased": [one.name for one in story.moved if one.biased],
-        "vehicles": [one.file for one in story.rounds], "law": story.law.file or None if story.law else None,
+        "vehicles": [one.file for one in story.rounds], "law": story.law_file or None,
         "sentences": ending(story),
     }
 
@@ -392,8 +433,8 @@ def _law(story: Story) -> list[Section]:
         said = learning.why_none(sought.learning)
         return [Section("A law learnt from the runs", [f"{said[0].upper()}{said[1:]}."])]
     return [Section("A law learnt from the runs", [
-        *learning.sentences(sought.learning.law, sought.addition), f"Written to {sought.file}."]),
-        *learning.law_sections(sought.learning.law, sought.addition, sought.picture)]
+        *learning.sentences(sought.learning.law, sought.addition), f"Written to {story.law_file}."]),
+        *learning.law_sections(sought.learning.law, sought.addition, learning.picture_of(sought))]
 
 
 def residual_spectra(story: Story) -> Curves:
@@ -419,7 +460,6 @@ def _place(story: Story) -> Curves:
     return comparing.moment_chart(f"The worst place initially: {worst.words}", residuals, worst, {
         "measured": residuals.measured, "residual initially": residuals.residual,
         "residual finally": after.residuals.residual})
-
 
 
 

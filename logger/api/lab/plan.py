@@ -24,10 +24,16 @@ from logger.api.vehicles import model_of
 from logger.chart_data import Array
 from logger.errors import BadInput
 from logger.estimation.sensor_noise import NOISE_MPS2
-from logger.lab.planning.outlook import ISOLABLE_SIGMA
-from logger.lab.planning.plan import LabNextDrive, LabPlan
-from logger.lab.planning.plan import plan as planned_by_lab
-from logger.lab.planning.planned_drive import DriveOption, PlannedCar, SensorNoise, at_speed
+from logger.lab.plan import (
+    ISOLABLE_SIGMA,
+    DriveOption,
+    LabNextDrive,
+    LabPlan,
+    PlannedCar,
+    SensorNoise,
+    at_speed,
+)
+from logger.lab.plan import plan as planned_by_lab
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.profiles.track import Track
 from logger.question import function
@@ -82,8 +88,8 @@ class Plan(CommandResult):
         return page(f"{self.vehicle}: which effects could these drives show?", drives, self.blocks())
 
 
-def plan_by(question: PlanQuestion) -> Plan:
-    """The answer to ``PlanQuestion``, which says what is raised."""
+@function(PlanQuestion)
+def plan(question: PlanQuestion) -> Plan:
     model, bench = model_of(question.vehicle), None
     tolerance = tolerance_of(question.tolerance, model.known)
     road = None if question.profile is None else drive_file.track_of(
@@ -106,16 +112,8 @@ def plan_by(question: PlanQuestion) -> Plan:
         found = planned_by_lab(there, None if bench is None else posterior, drives,
                                among(ready.effects, question.candidates), noise, usual, road or _longest_road(bench),
                                question.progress)
-    return plan_of(found, model.vehicle.name)
-
-
-plan = function("plan", PlanQuestion, plan_by)
-
-
-def plan_of(found: LabPlan, vehicle: str) -> Plan:
-    """What the lab found, as it is shown."""
     summary = as_json(found)
-    return Plan(Blocks(plan_blocks(found)), summary, found, vehicle, summary["detectability"],
+    return Plan(Blocks(plan_blocks(found)), summary, found, model.vehicle.name, summary["detectability"],
                 summary["isolability"], tuple(map(tuple, found.groups)),
                 tuple(NextDrive(do_words(one.option), dict(one.gains), one.more_named) for one in found.next),
                 summary["noise_mps2"])
@@ -240,16 +238,12 @@ def next_words(one: LabNextDrive) -> str:
     """What is to be done, and what it brings."""
     if not one.gains:
         return f"{do_words(one.option)}: adds next to nothing."
-    shown = _most(one.gains)
+    shown = dict(list(one.gains.items())[:_MOST_GAINS])
     more = len(one.gains) - len(shown)
     gains = ", ".join(f"{name} {number(each)}" for name, each in shown.items())
     count = f"{one.more_named:.1f} more effects named" if one.more_named >= 0.05 else "no more effects named"
     return (f"{do_words(one.option)}: {count} (expected). Standard deviations gained: {gains}"
             f"{f' and {more} more' if more else ''}.")
-
-
-def _most(gains: Mapping[str, float]) -> dict[str, float]:
-    return dict(list(gains.items())[:_MOST_GAINS])
 
 
 def as_json(found: LabPlan) -> dict[str, Any]:

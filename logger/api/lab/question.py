@@ -259,13 +259,13 @@ class LabLoopQuestion(LabQuestion):
     learns: Annotated[bool, "whether a law is learnt at all"] = True
 
 
-COMPARE = question.Verb(CompareQuestion, "logger.api.lab.compare:compared", (question.Out(
+COMPARE = question.Verb(CompareQuestion, "logger.api.lab.compare:compare", (question.Out(
     "write a page with pictures; .png, .svg or .pdf: the pictures alone; may repeat", others=("*",)),))
-DIAGNOSE = question.Verb(DiagnoseQuestion, "logger.api.lab.diagnose:diagnosed", (PAGE,))
-ADD_EFFECT = question.Verb(AddEffectQuestion, "logger.api.lab.compare:added", (question.Out(
+DIAGNOSE = question.Verb(DiagnoseQuestion, "logger.api.lab.diagnose:diagnose", (PAGE,))
+ADD_EFFECT = question.Verb(AddEffectQuestion, "logger.api.lab.compare:add_effect", (question.Out(
     "the new vehicle file", metavar="V2.yaml", others=("*",), many=False, is_drawn=False, required=True),))
-LEARN = question.Verb(LearnQuestion, "logger.api.lab.learn:law_of", (
+LEARN = question.Verb(LearnQuestion, "logger.api.lab.learn:learn", (
     question.Out("the law's file; FILE.html: a page with pictures; may repeat", metavar="LAW.py",
                  others=(".py", ".html"), is_drawn=False, required=True),))
-PLAN = question.Verb(PlanQuestion, "logger.api.lab.plan:plan_by", (PAGE,))
-LAB = question.Verb(LabLoopQuestion, "logger.api.lab.loop:story_of")
+PLAN = question.Verb(PlanQuestion, "logger.api.lab.plan:plan", (PAGE,))
+LAB = question.Verb(LabLoopQuestion, "logger.api.lab.loop:lab")

@@ -13,9 +13,7 @@ from logger.chart_data import Bars, Curves, Line
 from logger.lab.likelihood.record_band import ComparedBand
 from logger.lab.likelihood.whittle import LOWEST_HZ
 from logger.lab.residuals.breakdown import Part
-from logger.lab.residuals.removed import Removed
-from logger.lab.residuals.sensor_drift import EXPONENTIAL, OFFSET, RAMP, STEP, WANDER, Drift
-from logger.lab.residuals.unexplained import Shape, SpatialLine
+from logger.lab.residuals.unexplained import EXPONENTIAL, OFFSET, RAMP, STEP, WANDER, Drift, Removed, Shape, SpatialLine
 from logger.lab.selection.holdout import AS_FILED, JUDGED_ON, REFITTED, ErrorStep, fit_percent, rising
 from logger.printable import percent
 from logger.report.blocks import Block, Detail, Hint, Table

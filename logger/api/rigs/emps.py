@@ -11,11 +11,11 @@ from pathlib import Path
 
 import numpy as np
 
-from logger.api import rig_sets
+from logger.api import data_sets
 from logger.chart_data import Array
 from logger.errors import BadInput
 from logger.files import write_text
-from logger.studies.study import Column, Item, Result, Statement, Study, Table, Value, Word, Workload
+from logger.studies.study import Item, Result, Statement, Study, Table, Value, Word, Workload
 
 RATE_HZ = 1000.0
 DRIVE_N_PER_V = 35.15065
@@ -37,15 +37,15 @@ def run(folder: Path, effort: Workload) -> Result:
     force_n, place_m = _record(folder)
     count = effort.count(len(force_n), round(_FEWEST_S * RATE_HZ))
     steps = effort.each(["diagnosed", "simulated"])
-    with rig_sets.scratch() as place:
+    with data_sets.scratch() as place:
         axis = place / "axis.yaml"
         write_text(axis, VEHICLE)
         next(steps)
-        bench = rig_sets.write_rig_run(place / "axis", RATE_HZ, {"displacement_m": place_m[:count]},
+        bench = data_sets.write_rig_run(place / "axis", RATE_HZ, {"displacement_m": place_m[:count]},
                                        {"force_n": force_n[:count]})
-        found = rig_sets.improved(axis, [bench])
+        found = data_sets.improved(axis, [bench])
         next(steps)
-        made = rig_sets.simulated(found, bench, thin=True)
+        made = data_sets.simulated(found, bench, thin=True)
     list(steps)
     skip = round(_SKIP_S * made.rate_hz)
     size = float(np.sqrt(np.mean(made.measured[skip:] ** 2)))
@@ -55,7 +55,7 @@ def run(folder: Path, effort: Workload) -> Result:
     ours = (numbers["mass_kg"], numbers["damping_n_s_per_m"],
             friction.parameters[FRICTION] if friction else 0.0)
     return Result((_beside(found, ours), found.effects), _verdict(found, linear, better),
-                  rig_sets.pictures("Force of the axis", made, "N", _SHOWN_S, skip), (
+                  data_sets.pictures("Force of the axis", made, "N", _SHOWN_S, skip), (
         Statement("dry_friction is named first (1: yes)", "Coulomb friction",
                   float(found.diagnosis.verdict[:1] == (EFFECT,)), 1, 1, of=("EMPS friction",)),
         Statement("error of the force over the force", "Coulomb friction", better, 0.0, linear / 2,
@@ -66,28 +66,28 @@ def run(folder: Path, effort: Workload) -> Result:
 
 def _record(folder: Path) -> tuple[Array, Array]:
     """Force [N] and place [m], both (n,)."""
-    drive, place_m = rig_sets.columns_in(folder, "DATA_EMPS*", "the training record DATA_EMPS.mat", {
+    drive, place_m = data_sets.columns_in(folder, "DATA_EMPS*", "the training record DATA_EMPS.mat", {
         "csv": ("vir_V", "qm_m"), "mat": ("vir", "qm")})
     if len(drive) < _FEWEST_S * RATE_HZ:
         raise BadInput(f"{folder}: expected {_FEWEST_S * RATE_HZ:g} samples or more, found {len(drive)}")
     return DRIVE_N_PER_V * drive, place_m
 
 
-def _verdict(found: rig_sets.Improved, linear: float, better: float) -> str:
+def _verdict(found: data_sets.Improved, linear: float, better: float) -> str:
     names = " and ".join(found.diagnosis.verdict) or "nothing"
     return (f"diagnose names {names}. The error of the force that moves the axis is {better:.3f} of its r.m.s., "
             f"{linear:.3f} with mass and viscous friction alone.")
 
 
-def _beside(found: rig_sets.Improved, ours: Sequence[float]) -> Table:
+def _beside(found: data_sets.Improved, ours: Sequence[float]) -> Table:
     """Published numbers and ours with standard errors."""
     friction = next((one for one in found.added if one.effect == EFFECT), None)
     errors = (found.standard_error("mass_kg"), found.standard_error("damping_n_s_per_m"),
               friction.standard_errors.get(FRICTION) if friction else None)
     rows = tuple((name, printed, value, error, 100 * (value / printed - 1))
                  for (name, printed), value, error in zip(PUBLISHED, ours, errors, strict=True))
-    return Table("Numbers of the axis", (Column("number"), Column("published", ".5g"), Column("ours", ".5g"), Column(
-        "its standard error", ".2g"), Column("apart [%]", "+.1f")), rows)
+    return Table("Numbers of the axis", ("number", "published .5g", "ours .5g", "its standard error .2g",
+                                         "apart [%] +.1f"), rows)
 
 
 _DOWNLOAD = "download the EMPS files from nonlinearbenchmark.org and unpack them; DATA_EMPS is read"
@@ -95,7 +95,7 @@ STUDY = Study(
     "emps", "A linear axis with friction: what its model lacks", "Numbers of the axis",
     "The training record is written as a user would: a component that its bench moves (the encoder's position) while "
     "its force is measured. The file knows the mass to 20 % and viscous friction to 50 %.",
-    rig_sets.rig_from_folder("the EMPS record", _DOWNLOAD, run),
+    data_sets.rig_from_folder("the EMPS record", _DOWNLOAD, run),
     (Item("EMPS friction", Word.AGREES, "diagnose names Coulomb friction, which halves the error of the force."),
      Item("EMPS numbers", Word.AGREES, "Mass, viscous and Coulomb friction within 1 %.")),
     source="A. Janot, M. Gautier, M. Brunot, Nonlinear System Identification Benchmarks, 2019",

@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 
-from logger.api import rig_sets
+from logger.api import data_sets
 from logger.errors import BadInput
 from logger.files import write_text
-from logger.studies.study import Column, Item, Result, Statement, Study, Table, Value, Word, Workload
+from logger.studies.study import Item, Result, Statement, Study, Table, Value, Word, Workload
 
 RATE_HZ = 1e7 / 2**14
 FIT, TEST, ARROW = slice(40650, 40650 + 65062), slice(40650 + 65062, 127400), slice(100, 40575)
@@ -39,24 +39,24 @@ EFFECT = "progressive_spring"
 
 def run(folder: Path, effort: Workload) -> Result:
     """As ``rig_from_folder`` calls it."""
-    volts = np.column_stack(rig_sets.columns_in(folder, "SNLS80mV.*", "the record SNLS80mV.csv or SNLS80mV.mat",
+    volts = np.column_stack(data_sets.columns_in(folder, "SNLS80mV.*", "the record SNLS80mV.csv or SNLS80mV.mat",
                                                 {"csv": ("V1", "V2"), "mat": ("V1", "V2")}))
     if len(volts) < TEST.stop:
         raise BadInput(f"{folder}: expected {TEST.stop} samples or more, found {len(volts)}")
     steps = effort.each(["diagnosed", "simulated", "simulated", "simulated"])
-    with rig_sets.scratch() as place:
+    with data_sets.scratch() as place:
         car = place / "box.yaml"
         write_text(car, VEHICLE)
 
         def written(name: str, samples: slice) -> Path:
-            return rig_sets.write_rig_run(place / name, RATE_HZ, {"force_n": volts[samples, 0]},
+            return data_sets.write_rig_run(place / name, RATE_HZ, {"force_n": volts[samples, 0]},
                                           {"displacement_m": volts[samples, 1]}, "forces: {force_n: {on: body}}\n")
 
         next(steps)
         fitted = slice(FIT.start, FIT.start + effort.count(FITTED, 6000))
-        found = rig_sets.improved(car, [written("fit", fitted)])
+        found = data_sets.improved(car, [written("fit", fitted)])
         zero = float(volts[fitted, 1].mean())  # of the output: as the fit has it, not as a test has it
-        made = [rig_sets.simulated(found, written(name, samples), volts[samples, 1] - zero)
+        made = [data_sets.simulated(found, written(name, samples), volts[samples, 1] - zero)
                 for (name, samples), _ in zip(TESTS, steps, strict=False)]
         next(steps, None)
     linear, better = ([1e3 * one.rms(getattr(one, which), _SKIP) for one in made] for which in ("linear", "better"))
@@ -68,14 +68,14 @@ def run(folder: Path, effort: Workload) -> Result:
     rows = (*PUBLISHED_MV, ("ridelog, as a linear rig", linear[0], linear[1], linear[2]),
             ("ridelog, with the named effects", better[0], better[1], better[2]))
     table = Table("R.m.s. error of the simulated output [mV]", (
-        Column("model"), *(Column(name.removeprefix("Silverbox "), ".3g") for name, _ in TESTS)), rows)
+        "model", *(f"{name.removeprefix('Silverbox ')} .3g" for name, _ in TESTS)), rows)
     return Result((table, found.effects), _verdict(found, linear, better), tuple(
         picture
-        for place in (0, 1) for picture in rig_sets.pictures(TESTS[place][0], made[place], "V", _SHOWN_S, _SKIP)),
+        for place in (0, 1) for picture in data_sets.pictures(TESTS[place][0], made[place], "V", _SHOWN_S, _SKIP)),
         (named, *values))
 
 
-def _verdict(found: rig_sets.Improved, linear: list[float], better: list[float]) -> str:
+def _verdict(found: data_sets.Improved, linear: list[float], better: list[float]) -> str:
     names = " and ".join(found.diagnosis.verdict) or "nothing"
     return (f"diagnose names {names}. On the multisine that no fit has seen the simulated output is off by "
             f"{better[0]:.2f} mV, {linear[0]:.2f} mV as a linear rig; on the arrow by {better[1]:.2f} mV instead of "
@@ -90,7 +90,7 @@ STUDY = Study(
     "displacement. The file of a single mass knows mass and spring to 20 % and the damper to 50 %. "
     f"The lab sees the first {FITTED} samples of the part for fitting, and nothing of the tests. The "
     f"first {_SKIP} samples of each test are left out, as published.",
-    rig_sets.rig_from_folder("the Silverbox", _DOWNLOAD, run),
+    data_sets.rig_from_folder("the Silverbox", _DOWNLOAD, run),
     (Item("Silverbox equation", Word.AGREES, "diagnose names the cubic spring of the circuit."),
      *(Item(name, Word.BETTER, "The simulated output is closer to the record than that of the best published network.")
        for name, _ in TESTS)),

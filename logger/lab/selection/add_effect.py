@@ -28,7 +28,7 @@ from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import standard_errors
-from logger.lab.residuals.removed import Removed, removed_from
+from logger.lab.residuals.unexplained import Removed, removed_from
 from logger.lab.selection.candidate_fit import chance_of
 from logger.lab.selection.evidence import FALSE_ALARM
 from logger.lab.selection.holdout import AS_FILED, REFITTED, ErrorStep, cross_validate, rising

@@ -20,7 +20,7 @@ from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit, fit_to_the_end
 from logger.lab.likelihood.noise_floor import is_within_discrepancy
 from logger.lab.likelihood.posterior import Posterior
-from logger.lab.residuals.noise_colour import is_coloured_noise
+from logger.lab.residuals.unexplained import is_coloured_noise
 from logger.lab.selection.candidate_fit import CandidateFit, chance_of, fit_roughly, refine, with_refinements
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION, INDISTINGUISHABLE, min_gain
 from logger.lab.selection.holdout import HoldOut
@@ -122,10 +122,14 @@ class Likelihood(Protocol[M, P, F]):
         no trial of its own, ``seen`` how the runs are misaligned."""
 
     def laid_anew(self, base: M) -> M | None:
-        """The model for effects that shift runs, where what they do may have been taken for a distance error."""
+        """The model for effects that shift runs, where what they do may have been taken for a distance error; unless
+        a likelihood says otherwise, there is none."""
+        return None
 
     def stripped(self, now: M, name: str) -> M | None:
-        """The model without one of its effects, all other numbers unchanged; None: it is the fitted one."""
+        """The model without one of its effects, all other numbers unchanged; None: it is the fitted one, as it is
+        unless a likelihood says otherwise."""
+        return None
 
     def without(self, now: M, name: str) -> M:
         """The model without one of its effects, fitted."""
@@ -142,6 +146,7 @@ class Likelihood(Protocol[M, P, F]):
 
     def refined_beside(self, now: M, name: str) -> M:
         """The model, or one with refinements of one of its effects, where they explain most of what it leaves."""
+        return now
 
     def chance(self, one: Chosen, gain: float, base: M, candidates: int) -> float:
         """Probability, at most, that noise alone gains as much over a model with any of so many candidates."""
@@ -151,12 +156,15 @@ class Likelihood(Protocol[M, P, F]):
 
     def leaves_noise(self, there: M | F) -> bool:
         """Whether what is left is noise though it is louder than expected."""
+        return False
 
     def explains_most(self, without: M | F, there: M | F) -> bool:
         """Whether more than half of the power of what was left is explained, on data that no fit saw."""
+        return False
 
     def is_within_calibration(self, without: M) -> bool:
         """Whether what a model leaves is within what calibrated sensors may be off by."""
+        return False
 
 
 class MeasuredRoad:

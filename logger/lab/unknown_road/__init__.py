@@ -1,4 +1,4 @@
 """Diagnosis without a measured profile: several drives over one road, which is integrated out.
 
-Reading order: likelihood, fit, one_road, diagnosis.
+Reading order: same_road, diagnosis.
 """

@@ -24,10 +24,20 @@ from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE, probability_by_chance
 from logger.lab.selection.holdout import HoldOut
 from logger.lab.selection.screening import shared_parameters
-from logger.lab.selection.stepwise import Search, SearchEffort, Selection, names_of
-from logger.lab.unknown_road.fit import SameRoadFit, TrialOnRoad, fit, screen
-from logger.lab.unknown_road.likelihood import NotOneRoad, RoadFitState, SameRoad
-from logger.lab.unknown_road.one_road import certain_two_roads, placed_by_road, possible_two_roads, road_agreements
+from logger.lab.selection.stepwise import Likelihood, Search, SearchEffort, Selection, names_of
+from logger.lab.unknown_road.same_road import (
+    NotOneRoad,
+    RoadFitState,
+    SameRoad,
+    SameRoadFit,
+    TrialOnRoad,
+    certain_two_roads,
+    fit,
+    placed_by_road,
+    possible_two_roads,
+    road_agreements,
+    screen,
+)
 from logger.vehicle.effect import Chosen, DriveEffect, Effect, ForceEffect, Misalignment, RoadEffect, chosen
 from logger.vehicle.named_parameters import free_parameters_of
 from logger.vehicle.simulate import PASS_OF_RATE
@@ -181,8 +191,10 @@ class RoadCandidate:
 
 
 @dataclass(frozen=True)
-class UnmeasuredRoad:
-    """The likelihood of drives over one road that nobody measured, as a search asks for it.
+class UnmeasuredRoad(Likelihood["RoadModel", "RoadTrial", "RoadCandidate"]):
+    """The likelihood of drives over one road that nobody measured, as a search asks for it. Places are numbers of the
+    road, to which most of the power belongs, and a colour of the noise is not told from a road: what a search asks of
+    these has the answers that a likelihood has by default.
 
     starts         so many trials of an effect at their own values are starts of fits, those whose gain is half of the
                    best one's or more; this also at its best strength, which holds for small changes only
@@ -204,12 +216,6 @@ class UnmeasuredRoad:
         for one in sorted(screen(base.problem, base.fit, trials), key=lambda one: -one.gain):
             by_effect.setdefault(one.chosen.effect.name, []).append(one)
         return [RoadTrial(tuple(ones)) for ones in by_effect.values()]
-
-    def laid_anew(self, base: RoadModel) -> None:
-        """Nothing: places are numbers of the road."""
-
-    def stripped(self, now: RoadModel, name: str) -> None:
-        """Nothing: the fitted one serves."""
 
     def without(self, now: RoadModel, name: str) -> RoadModel:
         """The model without an effect, fitted."""
@@ -253,22 +259,6 @@ class UnmeasuredRoad:
     def is_doubtful(self, base: RoadModel, one: RoadCandidate) -> bool:
         """Whether a fit is at an end of its range, or predicts drives by the others worse."""
         return one.chosen.at_bound or one.model.hold_out.error > base.hold_out.error
-
-    def refined_beside(self, now: RoadModel, name: str) -> RoadModel:
-        """Never: most of the power is the road's."""
-        return now
-
-    def leaves_noise(self, there: RoadModel | RoadCandidate) -> bool:
-        """Never: a colour of the noise is not told from a road."""
-        return False
-
-    def explains_most(self, without: RoadModel | RoadCandidate, there: RoadModel | RoadCandidate) -> bool:
-        """Never: most of the power is the road's."""
-        return False
-
-    def is_within_calibration(self, without: RoadModel) -> bool:
-        """Never: it is asked of rigs."""
-        return False
 
     def _state(self, base: RoadModel, effects: tuple[Chosen, ...]) -> RoadFitState:
         """The state of a model with other effects."""

@@ -222,7 +222,7 @@ _HEADER = f"a header with {{}}[,{','.join(PLACE)}][,{USABLE}], each once"
 class Drive:
     """What a recorder wrote down while it drove, arrays (n,).
 
-    path           of the file, or of a run's folder
+    path           of the file, or of a run's folder; of a simulated drive its name
     rate_hz        samples a second
     time_s         evenly spaced [s]
     accel_z_mps2   of the sensor, up positive, gravity removed, band-limited by the recorder [m/s2]; on a rig whose

@@ -25,7 +25,6 @@ from logger.roads.iso8608 import CLASS_GD_N0_CM3, HIGHEST_CPM, LOWEST_CPM, displ
 from logger.roads.sections import federal_condition, ride_words, road_kinds
 from logger.studies.study import (
     Cell,
-    Column,
     Item,
     Picture,
     Result,
@@ -67,8 +66,7 @@ def _t2_2(effort: Workload) -> Result:
     values += about("Table 2.2", [Value("exponent of the metre in the unit of Gd", printed_power, _power_of_a_metre(),
                                         0.01, Word.MISPRINT)])
     table = Table(f"Classes, and {roads} generated roads of each geometric mean", (
-        Column("class"), Column("Gd(n0) found in the roads [cm3]", ".4g"), Column("waviness found", ".3f"),
-        Column("correctly classified [%]", ".0f")), tuple(rows))
+        "class", "Gd(n0) found in the roads [cm3]", "waviness found .3f", "correctly classified [%] .0f"), tuple(rows))
     verdict = ("All limits and means agree. The printed unit, 1e-6 m2 (cycle/m), is a misprint: a displacement "
                "spectrum is in m2 per cycle/m, or m3, and 1e-6 m3 is 1 cm3. For roads generated at each mean, ridelog "
                "finds the degree of roughness, a waviness near 2 and the class. The exponent of the metre is the "
@@ -133,7 +131,7 @@ def _t2_3(effort: Workload) -> Result:
     changes = [float(iri[place]) for place in range(1, len(iri)) if words[place] != words[place - 1]]
     values += about("Table 2.4", [Value(f"ride, mark {mark:.0f} [m/km]", mark, change, 0.005)
                                   for mark, change in zip(printed_marks, changes, strict=True)])
-    rides = Table("How a paved road rides", (Column("from [m/km]", ".2f"), Column("in short")),
+    rides = Table("How a paved road rides", ("from [m/km] .2f", "in short"),
                   tuple((change, ride_words(change)) for change in (0.0, *changes)))
     federal = [federal_condition(one) for one in iri.tolist()]
     values += about("2.2.2.3 targets", [
@@ -194,9 +192,8 @@ def _f2_7(effort: Workload) -> Result:
         "smallest ratio of the spectra in any band, class D over class B", "shifted upward at all wave numbers",
         float((levels[1] / levels[0]).min()), least=1.0)])
     table = Table("Two roads, classified from their elevations", (
-        Column("printed class"), Column("our class"), Column("its mean Gd(n0) [cm3]", ".0f"),
-        Column("Gd(n0) found [cm3]", ".1f"), Column("waviness found", ".3f"),
-        Column("scatter of the raw spectrum [dB]", ".1f"), Column("of the smoothed [dB]", ".2f")), tuple(rows))
+        "printed class", "our class", "its mean Gd(n0) [cm3] .0f", "Gd(n0) found [cm3] .1f", "waviness found .3f",
+        "scatter of the raw spectrum [dB] .1f", "of the smoothed [dB] .2f"), tuple(rows))
     verdict = ("As the text describes: the rough road's spectrum lies above the smooth one's at all wave numbers, and "
                "both fall towards short waves. The raw spectra are ragged; smoothing over the bands of Eq 2.4 to 2.6 "
                f"reduces their scatter from {scatters[0][0]:.1f} to {scatters[0][1]:.1f} dB. The text says that the "
@@ -245,8 +242,7 @@ def _t2_7(effort: Workload) -> Result:
             else:
                 rows.append((weighting.name, name, "infinite" if said else "none",
                              "without effect" if said is None else "infinite" if mine == inf else f"{mine:g}"))
-    absent = Table("Sections that a weighting lacks", (
-        Column("weighting"), Column("parameter"), Column("printed"), Column("ours")), tuple(rows))
+    absent = Table("Sections that a weighting lacks", ("weighting", "parameter", "printed", "ours"), tuple(rows))
     verdict = (f"All {len(values)} finite parameters agree. Sections that the tables omit, by an infinite frequency, "
                "are omitted here too. Study fig-2-18 evaluates the formula with them.")
     return Result((absent,), verdict, (), tuple(values))
@@ -322,8 +318,7 @@ def _f2_18(effort: Workload) -> Result:
     rows = tuple((name, float(f_hz[level.argmax()]), float(level.max()), float(f_hz[level > level.max() - 3].min()),
                   float(f_hz[level > level.max() - 3].max())) for name, level in levels.items())
     table = Table("The curves (printed as pictures only)", (
-        Column("weighting"), Column("largest at [Hz]", ".3g"), Column("there [dB]", "+.2f"),
-        Column("within 3 dB of it from [Hz]", ".3g"), Column("to [Hz]", ".3g")), rows)
+        "weighting", "largest at [Hz] .3g", "there [dB] +.2f", "within 3 dB of it from [Hz] .3g", "to [Hz] .3g"), rows)
     verdict = ("The curves agree with the standard's factors to the printed digit. Eq 2.16 as printed does not: its "
                "denominator has f5 and Q5, like its numerator, so it is 1 at all frequencies, and Wk at 1 Hz would be "
                "twice as large. The denominator needs f6 and Q6. Of the figures the text says only that they plot "
@@ -370,8 +365,8 @@ def _f2_20(effort: Workload) -> Result:
     dose_per_rms = 1.4  # the estimated dose of ISO 2631-1, Eq B.3
     zones = [(hours, caution_zone(hours, 2), caution_zone(hours, 4)) for hours in effort.each(hours_shown)]
     table = Table("The zone, weighted r.m.s.", (
-        Column("hours a day", ".3g"), Column("n = 2, from [m/s2]", ".3f"), Column("to [m/s2]", ".3f"),
-        Column("n = 4, from [m/s2]", ".3f"), Column("to [m/s2]", ".3f"), Column("printed")), tuple(
+        "hours a day .3g", "n = 2, from [m/s2] .3f", "to [m/s2] .3f", "n = 4, from [m/s2] .3f", "to [m/s2] .3f",
+        "printed"), tuple(
         (hours, two.lower, two.upper, four.lower, four.upper,
          "shaded" if printed_shaded_hours[0] <= hours <= printed_shaded_hours[1] else "not shaded")
         for hours, two, four in zones))

@@ -52,7 +52,6 @@ from logger.studies.drives import (
 from logger.studies.study import (
     Cell,
     Check,
-    Column,
     Item,
     Picture,
     Result,
@@ -70,9 +69,8 @@ from logger.vehicle.models import GOLDEN_CAR, quarter_car, structure_of
 from logger.vehicle.modes import modes, undamped_frequencies_hz
 from logger.vehicle.structure import Structure
 
-COLUMNS = (Column("motion"), Column("printed [Hz]", ".1f"), Column("undamped, coupled [Hz]", ".3f"),
-           Column("springs and tires in series [Hz]", ".3f"), Column("damped, coupled [Hz]", ".3f"),
-           Column("printed damping", ".2f"), Column("in series, damping", ".3f"), Column("coupled, damping", ".3f"))
+COLUMNS = ("motion", "printed [Hz] .1f", "undamped, coupled [Hz] .3f", "springs and tires in series [Hz] .3f",
+           "damped, coupled [Hz] .3f", "printed damping .2f", "in series, damping .3f", "coupled, damping .3f")
 
 
 def _t4_1(effort: Workload) -> Result:
@@ -161,9 +159,9 @@ def _t4_3(effort: Workload) -> Result:
     rows = tuple((name, gd, limit, float(one), float(spread), iri_of_road(gd, length_m).value)
                  for (name, gd, limit), one, spread in zip(PRINTED_T4_3, mean, std, strict=True))
     table = Table("Upper limits of the classes", (
-        Column("class"), Column("printed Gd(n0) [cm3]", ".0f"), Column("printed IRI [m/km]", ".2f"),
-        Column(f"ours, mean of {roads} roads of 1 km [m/km]", ".2f"),
-        Column("standard deviation between roads [m/km]", ".2f"), Column("ours, computed [m/km]", ".3f")), rows)
+        "class", "printed Gd(n0) [cm3] .0f", "printed IRI [m/km] .2f",
+        f"ours, mean of {roads} roads of 1 km [m/km] .2f", "standard deviation between roads [m/km] .2f",
+        "ours, computed [m/km] .3f"), rows)
     power = float(np.polyfit(np.log(gds), np.log(mean), 1)[0])
     factor = float((mean / np.sqrt(gds)).mean())
     verdict = (f"The relation agrees: {factor:.4f} beside the printed {iso8608.IRI_PER_ROOT_GD}, and the power is one "
@@ -219,9 +217,8 @@ def _f4_3(effort: Workload) -> Result:
         classify(iso8608.generate(asked, length_m, spacing_m, 0), spacing_m).gd_n0_cm3, asked / 4,
         Word.MISPRINT)])
     table = Table(f"R.m.s. elevation of {roads} roads of 1 km", (
-        Column("Gd(n0) [cm3]", ".0f"), Column("class"), Column("printed quality"),
-        Column("sum of Eq 4.2's amplitudes [mm]", ".2f"), Column("ours, mean [mm]", ".2f"),
-        Column("standard deviation between roads [mm]", ".2f")), tuple(rows))
+        "Gd(n0) [cm3] .0f", "class", "printed quality", "sum of Eq 4.2's amplitudes [mm] .2f", "ours, mean [mm] .2f",
+        "standard deviation between roads [mm] .2f"), tuple(rows))
     verdict = ("The r.m.s. elevation of generated roads is that of Eq 4.2's amplitudes, in proportion to the square "
                "root of the degree of roughness. Of Fig 4.5 the text says that its means are those of earlier work "
                "and that its scatter is large; here roads of 1 km with all waves of Eq 4.2 scatter by 2 %. A road of "
@@ -279,7 +276,7 @@ def _f4_16(effort: Workload) -> Result:
     values = about(("Fig 4.16", "Fig 4.17"), [
         Value("c of IRI = c Gd^b", iso8608.IRI_PER_ROOT_GD, factor, 0.01 + 3 * factor * factor_std),
         Value("b of IRI = c Gd^b", printed_power, power, 3 * power_std)])
-    table = Table(f"Power laws through {roads} roads each", (Column("set"), Column("c", ".4f"), Column("b", ".4f")),
+    table = Table(f"Power laws through {roads} roads each", ("set", "c .4f", "b .4f"),
                   (*((f"ours, {number + 1}", one[1], one[0]) for number, one in enumerate(fits)),
                    ("ours, all", factor, power), ("printed, Eq 4.39", iso8608.IRI_PER_ROOT_GD, printed_power),
                    ("ours, computed", iri_of_road(1.0, length_m).value, 0.5)))
@@ -325,8 +322,7 @@ def _f4_18(effort: Workload) -> Result:
     values: tuple[Check, ...] = (*(Value(f"set {number + 1}, IRI found per IRI wanted", 1.0, slope, 0.01 + 3 * chance)
                 for number, slope in enumerate(slopes)),
               Statement("correlation, the smaller of both sets", "highly linear", min(alike_sets), least=0.95))
-    table = Table("IRI of generated roads", (Column("printed: wanted [m/km]", ".0f"), Column("set 1 [m/km]", ".2f"),
-                                             Column("set 2 [m/km]", ".2f")),
+    table = Table("IRI of generated roads", ("printed: wanted [m/km] .0f", "set 1 [m/km] .2f", "set 2 [m/km] .2f"),
                   tuple((one, *pair) for one, pair in zip(wanted.tolist(), found.T.tolist(), strict=True)))
     spread = relative_spread(length_m)
     verdict = (f"As printed, highly linear: correlation {min(alike_sets):.3f} and {max(alike_sets):.3f}, slopes "
@@ -384,8 +380,8 @@ def _t4_4(effort: Workload) -> Result:
                                          "each within 3 % of the exact value",
                                          float(np.abs(errors).max()), 0.0, 3.0)])
     many = Table(f"The same on {len(drives)} other roads of IRI 5 m/km, one fit each", (
-        Column("number"), Column("noise model of the residual"), Column("r.m.s. error [%]", ".2f"),
-        Column("stated standard error [%]", ".2f"), Column("truth within two standard errors [%]", ".0f")),
+        "number", "noise model of the residual", "r.m.s. error [%] .2f", "stated standard error [%] .2f",
+        "truth within two standard errors [%] .0f"),
         tuple(chain.from_iterable(_scatter(words, name, draws) for name, words in NAMES.items())))
     verdict = (
         "From every start ours ends at the same estimate. The printed errors for one record differ by up to 2.4 %: "
@@ -404,9 +400,9 @@ def _drive(seed: int) -> Run:
 
 def _by_start(words: str, masses: list[tuple[int, float]], rates: list[tuple[int, float]], errors: Array,
               printed: Array) -> Table:
-    columns = [Column("start mass [kg]", ".0f")]
+    columns = ["start mass [kg] .0f"]
     for _, rate in rates:
-        columns += [Column(f"from {rate:.0f} N/m: printed [%]", ".2f"), Column("ours [%]", "+.4f")]
+        columns += [f"from {rate:.0f} N/m: printed [%] .2f", "ours [%] +.4f"]
     rows = tuple((mass, *chain.from_iterable((float(printed[row, column]), error) for (column, _), error in zip(
         rates, found, strict=True))) for (row, mass), found in zip(masses, errors.tolist(), strict=True))
     return Table(f"Error of the {words}, by the start of the fit", tuple(columns), rows)
@@ -469,9 +465,8 @@ def _f4_19(effort: Workload) -> Result:
             Statement("peak over the bump, over the r.m.s. on the road behind it", "the road's roughness is noise that "
                       "is added", float(np.abs(record.measured_mps2).max()) / road, 3.0, word=Word.NOT_REPRODUCIBLE)])
     table = Table("Response in the two windows (printed as pictures only)", (
-        Column("window [m]", ".0f"), Column("lasts [s]", ".1f"), Column("peak [m/s2]", ".2f"),
-        Column("r.m.s. over the bump [m/s2]", ".2f"), Column("r.m.s. behind it [m/s2]", ".2f"),
-        Column("share of the power from the bump [%]", ".0f")), tuple(rows))
+        "window [m] .0f", "lasts [s] .1f", "peak [m/s2] .2f", "r.m.s. over the bump [m/s2] .2f",
+        "r.m.s. behind it [m/s2] .2f", "share of the power from the bump [%] .0f"), tuple(rows))
     verdict = (f"As the text describes: bumps of {1000 * BUMP_HEIGHT_M:.0f} mm, the rear axle's "
                f"{wheelbase_m / BUMP_MPS:.2f} s behind the front's, and a response far above that to the road; in 100 "
                f"m, {rows[1][-1]:.0f} % of its power still comes from the bump. The source does not give the bump and "
@@ -499,8 +494,8 @@ def _f4_21(effort: Workload) -> Result:
     numbers = np.stack([their_mass, mass, expected, 100 * (mass / TRUTH[MASS] - 1)], axis=1).tolist()
     rows = tuple((window, "very close to 875", *found) for window, found in zip(windows, numbers, strict=True))
     table = Table("Mass, by the length of the window", (
-        Column("window [m]", ".0f"), Column("printed [kg]"), Column("white noise, the source's method [kg]", ".1f"),
-        Column("ours [kg]", ".1f"), Column("standard error [kg]", ".1f"), Column("error of ours [%]", "+.2f")), rows)
+        "window [m] .0f", "printed [kg]", "white noise, the source's method [kg] .1f", "ours [kg] .1f",
+        "standard error [kg] .1f", "error of ours [%] +.2f"), rows)
     inside = int((np.abs(mass - TRUTH[MASS]) < 2 * expected).sum())
     verdict = ("As the source finds, the window hardly matters once both axles are over the bump (some 8 m): the bump "
                f"shows the mass, the road behind it almost nothing. In {inside} of {len(windows)} windows the truth "
@@ -541,8 +536,8 @@ def _f4_22(effort: Workload) -> Result:
     said = f"within {printed_within_percent:g} % of 875"
     rows = tuple((float(start), said if 699 < start < 1101 else None, float(end), 100 * float(end / TRUTH[MASS] - 1))
                  for start, end in zip(starts, ends, strict=True))
-    table = Table("Mass, by the start of the fit", (Column("start [kg]", ".1f"), Column("printed end [kg]"),
-                  Column("our end [kg]", ".4f"), Column("error [%]", "+.3f")), rows)
+    table = Table("Mass, by the start of the fit", ("start [kg] .1f", "printed end [kg]", "our end [kg] .4f",
+                                                    "error [%] +.3f"), rows)
     verdict = (f"All {len(starts)} starts, from {starts[0]:.0f} to {starts[-1]:.0f} kg, end within {np.ptp(ends):.1g} "
                "kg of each other; the source's 20 lie within 6 % of 875 kg. The error of the estimate, "
                f"{ends.mean():.1f} +- {standard_error:.1f} kg, comes from the road of IRI 5 m/km, which the fit does "
@@ -570,7 +565,7 @@ def _f4_25(effort: Workload) -> Result:
     widths_m = (1.83, 2.13, 2.44, 2.74, 3.05, 3.35)
     heights, widths = effort.some(heights_m), effort.some(widths_m)
     peaks = np.array([[_peak(height, width) for width in widths] for height in effort.each(heights)])
-    columns = (Column("height [mm]", ".1f"), *(Column(f"width {width:.2f} m [m/s2]", ".2f") for width in widths))
+    columns = ("height [mm] .1f", *(f"width {width:.2f} m [m/s2] .2f" for width in widths))
     rows = tuple((1000 * height, *map(float, row)) for height, row in zip(heights, peaks, strict=True))
     own = _peak(BUMP_HEIGHT_M, BUMP_WIDTH_M)
     verdict = ("As the source says, a higher bump gives a larger peak and a wider one a smaller. The car is linear, "
@@ -616,14 +611,13 @@ def _f4_27(effort: Workload) -> Result:
     record = without_profile(drive)
     heights, widths = effort.some(heights_m, 3), effort.some(widths_m, 3)
     errors = np.array([[_error_percent(record, height, width) for width in widths] for height in effort.each(heights)])
-    columns = (Column("assumed height [mm]", ".1f"),
-               *(Column(f"assumed width {width:.2f} m [%]", "+.1f") for width in widths[::shown]))
+    columns = ("assumed height [mm] .1f", *(f"assumed width {width:.2f} m [%] +.1f" for width in widths[::shown]))
     rows = tuple((1000 * height, *row[::shown].tolist())
                  for height, row in zip(heights[::shown], errors[::shown], strict=True))
     taken = Bump(_BUMP_AT_M_F4_27, 0.1016, 3.05)
     found = mass_and_bump(record, taken)
     ours = Table("Ours: mass, bump and speed together, starting from a bump of 101.6 mm by 3.05 m", (
-        Column("number"), Column("truth", ".4g"), Column("estimate", ".5g"), Column("standard error", ".2g")), tuple(
+        "number", "truth", "estimate .5g", "standard error .2g"), tuple(
         (words, truth, found.parameters[name], found.standard_errors[name]) for name, words, truth in numbers))
     best = [widths[int(np.abs(row).argmin())] for row in errors]
     verdict = ("The slanting valley of the printed picture appears: the error is smallest for assumed bumps from "
@@ -684,8 +678,8 @@ def _f4_30(effort: Workload) -> Result:
     peaks = [float(np.abs(accel[part]).max()) for part in (front, time_s >= front_s + wheelbase_m / BRIDGE_MPS)]
     shaken_s = float(time_s[np.abs(accel) > still * max(peaks)].max()) - front_s
     table = Table("A step of 38.1 mm at 48.3 km/h (printed as a picture only)", (
-        Column("rear axle behind the front [s]", ".3f"), Column("peak from the front axle [m/s2]", ".2f"),
-        Column("from the rear axle [m/s2]", ".2f"), Column("duration of the response [s]", ".1f")),
+        "rear axle behind the front [s] .3f", "peak from the front axle [m/s2] .2f", "from the rear axle [m/s2] .2f",
+        "duration of the response [s] .1f"),
         ((wheelbase_m / BRIDGE_MPS, *peaks, shaken_s),))
     verdict = (f"Two steps, {wheelbase_m / BRIDGE_MPS:.2f} s apart, and two impacts; the body's motion decays within "
                f"{shaken_s:.1f} s. The source does not give the height and speed of this figure; those of the analysis "
@@ -726,17 +720,16 @@ def _f4_31(effort: Workload) -> Result:
                                                       for height in effort.each(heights)), strict=True))
     in_proportion = TRUTH[MASS] * np.array(heights) / STEP_M
     table = Table("Mass found for each assumed height of the step", (
-        Column("assumed height [mm]", ".2f"), Column("printed: in proportion [kg]", ".1f"),
-        Column("ours, residual as white noise [kg]", ".1f"),
-        Column("ours, innovations form [kg]", ".1f")),
+        "assumed height [mm] .2f", "printed: in proportion [kg] .1f", "ours, residual as white noise [kg] .1f",
+        "ours, innovations form [kg] .1f"),
         tuple(zip((1000 * np.array(heights)).tolist(), in_proportion.tolist(), white.tolist(), masses.tolist(),
                   strict=True)))
     taken = RoadInput(step=RoadStep(_STEP_AT_M_F4_31, heights_m[0]))
     place = {"step.height_m": heights_m[0], "step.start_m": _STEP_AT_M_F4_31}
     known, both = fitted(record, place, True, taken), fitted(record, {MASS: 700.0, **place}, True, taken)
     ours = Table("Ours: the step estimated", (
-        Column("what is known"), Column("height [mm]", ".2f"), Column("its standard error [mm]", ".2f"),
-        Column("mass [kg]", ".1f"), Column("its standard error [kg]", ".1f")), tuple(
+        "what is known", "height [mm] .2f", "its standard error [mm] .2f", "mass [kg] .1f",
+        "its standard error [kg] .1f"), tuple(
         (words, 1000 * one.parameters["step.height_m"], 1000 * one.standard_errors["step.height_m"],
          one.parameters.get(MASS), one.standard_errors.get(MASS))
         for words, one in (("the mass, 875 kg", known), ("neither mass nor height", both))))
@@ -850,8 +843,8 @@ def _f4_34(effort: Workload) -> Result:
                   comfort_word(float(found[0][index].max())).replace("_",
                                                                      " ")) for index, section in enumerate(SECTIONS_M))
     table = Table("Largest weighted r.m.s. acceleration", (
-        Column("section [m]", ".0f"), Column("printed, nearly [m/s2]", ".1f"), Column("ours [m/s2]", ".2f"),
-        Column(f"least of {roads} roads", ".2f"), Column("largest", ".2f"), Column("in words")), rows)
+        "section [m] .0f", "printed, nearly [m/s2] .1f", "ours [m/s2] .2f", f"least of {roads} roads .2f",
+        "largest .2f", "in words"), rows)
     verdict = (f"Of the same size: up to {found[0][0].max():.2f} m/s2 in 1 m windows beside a printed value of nearly "
                "1.5. The source does not give its road, the initial state of its filter or how it weights 1 m, which "
                "this car passes in 1/13 s. In 10 m windows the weighted acceleration is already half of that.")
@@ -907,8 +900,8 @@ def _f4_36(effort: Workload) -> Result:
     per_metre = np.array([_peak_f4_36(STEP_M, kmh / 3.6) for kmh in effort.each(speeds.tolist())]) / STEP_M
     peaks = np.outer(heights_m, per_metre)
     table = Table("Largest a_w of a metre (printed as a picture only)", (
-        Column("step [mm]", ".1f"), *(Column(f"{kmh:.0f} km/h [m/s2]", ".2f") for kmh in speeds),
-        Column(f"in words at {speeds[-1]:.0f} km/h")), tuple(
+        "step [mm] .1f", *(f"{kmh:.0f} km/h [m/s2] .2f" for kmh in speeds),
+        f"in words at {speeds[-1]:.0f} km/h"), tuple(
         (1000 * height, *row, comfort_word(row[-1]).replace("_", " "))
         for height, row in zip(heights_m, peaks.tolist(), strict=True)))
     own = _peak_f4_36(STEP_M, BRIDGE_MPS)

@@ -53,7 +53,6 @@ from logger.studies.drives import (
 from logger.studies.study import (
     Cell,
     Check,
-    Column,
     Item,
     Picture,
     Result,
@@ -89,13 +88,13 @@ def _t6_1(effort: Workload) -> Result:
     jobs = [*(case[1:] for case in CASES_T6_1), *((height, width, speed, road_iri) for height, width, speed in factors)]
     found = [_both_ways(*job, seed=seed) for seed, job in enumerate(effort.each(jobs))]
     cases, draws = found[:len(CASES_T6_1)], np.array(found[len(CASES_T6_1):])
-    printed = Table("Printed", (Column("bump", ".0f"), *(Column(f"trial {trial}, {what}", form) for trial in (1, 2)
-                                for what, form in (("mass [kg]", ".3f"), ("error [%]", ".2f")))), tuple(
+    printed = Table("Printed", ("bump .0f", "trial 1, mass [kg] .3f", "trial 1, error [%] .2f",
+                                "trial 2, mass [kg] .3f", "trial 2, error [%] .2f"), tuple(
         (float(number), masses[0], errors[0], masses[1], errors[1])
         for number, (masses, errors) in enumerate(zip(PRINTED_KG, PRINTED_PERCENT, strict=True), start=1)))
     one_by_one = Table("Simulated: assumed bump 150 mm by 2.60 m at 16.1 km/h; the true one differs by row", (
-        Column("truth relative to the assumption"), Column("the source's method: error of the mass [%]", "+.2f"),
-        Column("ours, bump and speed estimated [%]", "+.2f"), Column("its standard error [%]", ".2f")), tuple(
+        "truth relative to the assumption", "the source's method: error of the mass [%] +.2f",
+        "ours, bump and speed estimated [%] +.2f", "its standard error [%] .2f"), tuple(
         (case[0], *errors) for case, errors in zip(CASES_T6_1, cases, strict=True)))
     theirs, ours, expected = draws.T
     rows: tuple[tuple[Cell, ...], ...] = (
@@ -105,8 +104,7 @@ def _t6_1(effort: Workload) -> Result:
          _rms_t6_1(ours), float(np.abs(ours).max()),
          float(100 * (np.abs(ours) < 2 * expected).mean())))
     many = Table(f"Random errors of 5 % r.m.s. in height, width and speed, on roads of IRI {road_iri:g} m/km", (
-        Column("way"), Column("r.m.s. error [%]", ".1f"), Column("largest [%]", ".1f"),
-        Column("truth within two standard errors [%]", ".0f")), rows)
+        "way", "r.m.s. error [%] .1f", "largest [%] .1f", "truth within two standard errors [%] .0f"), rows)
     by_trial = {f"Table 6.{trial}": _rms_t6_1(np.array(PRINTED_PERCENT)[:, trial - 1]) for trial in (1, 2)}
     per_percent = _per_percent_of_speed(cases)
     verdict = ("With a width or a speed 5 % off, the source's mass is about 5 or 11 % off; the height matters little. "
@@ -188,13 +186,12 @@ def _t6_3(effort: Workload) -> Result:
     drives = [_drive_t6_3(*job) for job in effort.each(jobs)]
     rows = tuple(_row_t6_3(*case, drives[number * roads:(number + 1) * roads]) for number, case in enumerate(cases))
     printed = Table("Printed: the road assumed flat", (
-        Column("bump"), Column("trial 1, mass [kg]", ".3f"), Column("error [%]", ".2f"),
-        Column("trial 2, mass [kg]", ".3f"), Column("error [%]", ".2f")), PRINTED_T6_3)
+        "bump", "trial 1, mass [kg] .3f", "error [%] .2f", "trial 2, mass [kg] .3f", "error [%] .2f"), PRINTED_T6_3)
     table = Table(f"Simulated, 48.3 km/h; figures are r.m.s. over {roads} roads", (
-        Column("true step [mm]", ".1f"), Column("IRI [m/km]", ".0f"), Column("road assumed flat: our answer"),
-        Column("step assumed a third too high, the source's method: error of mass [%]", ".1f"),
-        Column("ours, height estimated: error of mass [%]", ".1f"), Column("its standard error [%]", ".1f"),
-        Column("mass known: error of height [mm]", ".1f"), Column("its standard error [mm]", ".1f")), rows)
+        "true step [mm] .1f", "IRI [m/km] .0f", "road assumed flat: our answer",
+        "step assumed a third too high, the source's method: error of mass [%] .1f",
+        "ours, height estimated: error of mass [%] .1f", "its standard error [%] .1f",
+        "mass known: error of height [mm] .1f", "its standard error [mm] .1f"), rows)
     verdict = ("The source assumed a flat road. A flat input moves no car, whatever its mass: ridelog refuses to answer"
                ", and the printed masses, 12 to 60 % off, reflect the noise model and the road, not the car. A step "
                "assumed a third too high makes the mass about 15 % wrong on a smooth road (Fig 4.31). With the height "
@@ -308,9 +305,8 @@ def _t6_5(effort: Workload) -> Result:
     rows = tuple(_row_t6_5(printed, what, factor)
                  for printed, what, factor in zip(printed_rows, sizes, factors, strict=True))
     table = Table("Size that would explain the printed word", (
-        Column("location", ".0f"), Column("segment", ".0f"), Column("printed perception"), Column("printed reason"),
-        Column("speed [mph]", ".0f"), Column("quantity"), Column("a_w per unit of it [m/s2]", ".4f"),
-        Column("from", ".0f"), Column("to", ".0f"), Column("our word for the middle of the range")), rows)
+        "location .0f", "segment .0f", "printed perception", "printed reason", "speed [mph] .0f", "quantity",
+        "a_w per unit of it [m/s2] .4f", "from .0f", "to .0f", "our word for the middle of the range"), rows)
     verdict = ("Not reproducible: the records were never published, and no sizes are given. Computed backwards, the "
                f"three words require a step of {rows[0][7]:.0f} to {rows[0][8]:.0f} mm between two pavements, a "
                f"manhole {rows[1][7]:.0f} to {rows[1][8]:.0f} mm deep and a stretch of IRI {rows[2][7]:.0f} to "
@@ -381,10 +377,8 @@ def _f6_6(effort: Workload) -> Result:
                   *map(float, others)) for mph, slope, line, *others in
                  zip(SPEEDS_MPH, own.tolist(), drives, 100 * (two / own - 1), 100 * (heavy / own - 1), strict=True))
     table = Table("IRI per r.m.s. acceleration [m/km per m/s2] (printed as pictures only)", (
-        Column("speed [mph]", ".0f"), Column("computed", ".3f"), Column("from drives", ".3f"),
-        Column("spread of 25 ft windows [%]",
-               ".0f"), Column(f"two people of {rms_calibration.PASSENGER_KG:g} kg more [%]", "+.1f"),
-        Column("twice the mass [%]", "+.1f")), rows)
+        "speed [mph] .0f", "computed .3f", "from drives .3f", "spread of 25 ft windows [%] .0f",
+        f"two people of {rms_calibration.PASSENGER_KG:g} kg more [%] +.1f", "twice the mass [%] +.1f"), rows)
     verdict = ("Fig 6.3, a diagram, leads from the response through the vehicle to the IRI; the rest agrees with the "
                "figures: r.m.s. acceleration grows with the root of Gd(n0), whatever the length of the road, so the "
                "trendlines are straight and parallel on logarithmic axes; with Eq 4.39 that gives one line through "
@@ -395,8 +389,8 @@ def _f6_6(effort: Workload) -> Result:
                "source asks for.")
     factors = [one.accel_rms_per_root_gd.slope for one in drives]
     by_gd = Table("R.m.s. acceleration by degree of roughness: a factor times the root of Gd(n0) (Fig 6.4, 6.5)", (
-        Column("speed [mph]", ".0f"), Column("printed"), Column("factor [m/s2 per cm^1.5]", ".4f"),
-        Column("spread of 1 km roads [%]", ".1f"), *(Column(f"at {gd:g} cm3 [m/s2]", ".3f") for gd in PRINTED_GD_CM3)),
+        "speed [mph] .0f", "printed", "factor [m/s2 per cm^1.5] .4f", "spread of 1 km roads [%] .1f",
+        *(f"at {gd:g} cm3 [m/s2] .3f" for gd in PRINTED_GD_CM3)),
         tuple((float(mph), "a power trendline", factor, 100 * one.accel_rms_per_root_gd.spread,
                *(factor * gd**0.5 for gd in PRINTED_GD_CM3))
               for mph, factor, one in zip(SPEEDS_MPH, factors, drives, strict=True)))
@@ -479,18 +473,17 @@ def _f6_9(effort: Workload) -> Result:
     drift = np.array([[_bias_percent(mph, waviness, roads) for waviness in WAVINESS] for mph in speeds])
     own = np.array([100 * (one.iri_m_per_km.mean() / one.exact_m_per_km.mean() - 1) for one in ours])
     table = Table("IRI of a whole road beside the exact one, by speed", (
-        Column("speed [mph]", ".0f"), Column("printed, by r.m.s. (Fig 6.11)"),
-        *(Column(f"by r.m.s., waviness {waviness:g} [%]", "+.1f") for waviness in WAVINESS),
-        Column(f"ridelog estimate, waviness {WAVINESS[0]:g} [%]", "+.1f")), tuple(
+        "speed [mph] .0f", "printed, by r.m.s. (Fig 6.11)",
+        *(f"by r.m.s., waviness {waviness:g} [%] +.1f" for waviness in WAVINESS),
+        f"ridelog estimate, waviness {WAVINESS[0]:g} [%] +.1f"), tuple(
         (float(mph), PRINTED.get(mph, "between"), *map(float, row), float(one))
         for mph, row, one in zip(speeds, drift, own, strict=True)))
     drive = drive_over(road, windowed_mph * MPH_MPS, PS_2119)
     cut = [per_window(drive, PS_2119, window_m) for window_m in windows_m]
     windows = Table(f"IRI per window at {windowed_mph} mph, beside the exact one", (
-        Column("window [m]", ".2f"), Column("printed"), Column("windows", ".0f"),
-        Column("spread of the exact IRI [m/km]", ".2f"), Column("r.m.s. error by r.m.s. relation [m/km]", ".2f"),
-        Column("r.m.s. error, ridelog estimate [m/km]", ".2f"),
-        Column("exact within two standard errors [%]", ".0f")),
+        "window [m] .2f", "printed", "windows .0f", "spread of the exact IRI [m/km] .2f",
+        "r.m.s. error by r.m.s. relation [m/km] .2f", "r.m.s. error, ridelog estimate [m/km] .2f",
+        "exact within two standard errors [%] .0f"),
         tuple(_row_f6_9(window_m, one) for window_m, one in zip(windows_m, cut, strict=True)))
     verdict = ("The printed drift appears, and has a cause. On a road of waviness 2, for which the line of Fig 6.6 "
                f"was made, the relation stays within {np.abs(drift[:, 1]).max():.0f} %; on one of waviness "
@@ -592,10 +585,9 @@ def _f6_16(effort: Workload) -> Result:
     checks = {number: float(np.sqrt(np.mean(one.a_w_mps2**2)) / one.exact_m_per_km.mean())
               for number, one in stepped.items()}
     table = Table("Weighted acceleration by speed (printed as pictures only)", (
-        Column("speed [mph]", ".0f"), Column("a_w per IRI [m/s2 per m/km]", ".4f"),
-        Column("spread of 1 km roads [%]", ".0f"), Column("one road in the time domain", ".4f"),
-        *(Column(f"IRI {level:g}") for level in (1, 2, 4, 8)),
-        Column("a little uncomfortable from IRI [m/km]", ".1f")), tuple(
+        "speed [mph] .0f", "a_w per IRI [m/s2 per m/km] .4f", "spread of 1 km roads [%] .0f",
+        "one road in the time domain .4f", *(f"IRI {level:g}" for level in (1, 2, 4, 8)),
+        "a little uncomfortable from IRI [m/km] .1f"), tuple(
         (float(mph[number]), one.a_w_per_iri.slope, 100 * one.a_w_per_iri.spread, checks.get(number),
          *(comfort_word(one.a_w_per_iri.slope * level).replace("_", " ").replace(" uncomfortable", "")
            for level in (1, 2, 4, 8)),
@@ -656,18 +648,16 @@ def _f6_23(effort: Workload) -> Result:
     again = {mph: _biases_percent(mph, [one for one in PRINTED_MPH if PRINTED_MPH[one] == mph], effort)
              for mph in PRINTED_KMH}
     by_speed = Table("Roughness by speed: windows of 25 ft", (
-        Column("printed speed [mph]", ".0f"), Column("segments", ".0f"), Column("exact mean IRI [m/km]", ".2f"),
-        Column("printed, by r.m.s."),
-        Column("by r.m.s. [%]", "+.1f"), Column("ridelog estimate [%]", "+.1f"),
-        Column("by r.m.s. on more roads [%]", "+.1f"), Column("its standard error [%]", ".1f"),
-        Column("further roads", ".0f"),
-        Column("r.m.s. error by r.m.s. [m/km]", ".2f"), Column("ridelog estimate [m/km]", ".2f")), tuple(
+        "printed speed [mph] .0f", "segments .0f", "exact mean IRI [m/km] .2f", "printed, by r.m.s.",
+        "by r.m.s. [%] +.1f", "ridelog estimate [%] +.1f", "by r.m.s. on more roads [%] +.1f",
+        "its standard error [%] .1f", "further roads .0f", "r.m.s. error by r.m.s. [m/km] .2f",
+        "ridelog estimate [m/km] .2f"), tuple(
         _row_f6_23(mph, [one for number, one in found.items() if PRINTED_MPH[number] == mph], again[mph])
         for mph in speeds))
     a_w = np.concatenate([one.a_w_mps2 for one in found.values()])
     shares = comfort_shares(a_w)
-    comfort = Table("Comfort of all windows", (Column("word of Table 2.5"), Column("printed (6.5.2)"),
-                                              Column("ours [% of windows]", ".1f")), tuple(
+    comfort = Table("Comfort of all windows", ("word of Table 2.5", "printed (6.5.2)",
+                                               "ours [% of windows] .1f"), tuple(
         (word.replace("_", " "), PRINTED_COMFORT.get(word, "not named"), share)
         for word, share in shares.items()))
     slow, fast = (np.concatenate([again[mph] for mph, kmh in PRINTED_KMH.items()

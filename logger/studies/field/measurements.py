@@ -24,7 +24,7 @@ from logger.chart_data import Curves, Line
 from logger.modal.analysis import find_modes
 from logger.modal.five_storey import Masses, chain, random_response, with_damping_ratios
 from logger.studies import drives
-from logger.studies.study import Check, Column, Item, Picture, Result, Statement, Study, Table, Value, Word, Workload
+from logger.studies.study import Check, Item, Picture, Result, Statement, Study, Table, Value, Word, Workload
 
 PRINTED_TRUE_HZ = (0.890, 2.598, 4.095, 5.261, 6.000)
 _RATE_HZ = 20.0
@@ -66,9 +66,8 @@ def _five_modes(effort: Workload) -> Result:
                "determine a damping ratio no better. Versions of the example differ in the record's length; that of "
                "the current one is used, 300 s.")
     table = Table("The first record", (
-        Column("mode", ".0f"), Column("true [Hz]", ".3f"), Column("printed [Hz]", ".3f"), Column("ours [Hz]", ".3f"),
-        Column("its standard error [Hz]", ".3f"), Column("printed damping", ".3f"), Column("ours", ".4f"),
-        Column("its standard error", ".4f")), tuple(
+        "mode .0f", "true [Hz] .3f", "printed [Hz] .3f", "ours [Hz] .3f", "its standard error [Hz] .3f",
+        "printed damping .3f", "ours .4f", "its standard error .4f"), tuple(
         (float(mode), *map(float, row)) for mode, row in enumerate(zip(
             PRINTED_TRUE_HZ, printed_hz, hz, hz_std, printed_damping, damping, damping_std, strict=True), start=1)))
     picture = Picture(Curves("Damping ratio of each mode, in each record", "frequency [Hz]", "damping ratio", (
@@ -125,7 +124,7 @@ def _mass_from_a_bump(effort: Workload) -> Result:
                         1 - float(near) / scatter, 1 + float(near) / scatter, Word.NOT_REPRODUCIBLE))
     inside = float(np.mean(np.abs(errors) < 2 * given))
     table = Table("The mass from one bump (nothing of it is printed)", (
-        Column("package, run by us"), Column("error [%]", "+.2f"), Column("its standard error [%]", ".2f")),
+        "package, run by us", "error [%] +.2f", "its standard error [%] .2f"),
         (*peers, (f"ridelog, r.m.s. of {len(errors)} records", rms, float(given.mean()))))
     verdict = (f"The mass is {rms:.2f} % off (r.m.s. over {len(errors)} records), as close as the record's noise "
                f"allows, and the standard error says so: the truth lies within two standard errors in {inside:.0%}. "
@@ -179,8 +178,7 @@ def _lab_examination(effort: Workload) -> Result:
                      high))
     seeds = f"{'release' if counts['release'] else 'development'} seeds {counts['first_seed']} to {counts['last_seed']}"
     table = Table(f"Counts of the examination (printed in docs/examination.md), {seeds}", (
-        Column("asked"), Column("goal"), Column("true of"), Column("share [%]", ".1f"), Column("at least [%]", ".1f"),
-        Column("at most [%]", ".1f")), tuple(rows))
+        "asked", "goal", "true of", "share [%] .1f", "at least [%] .1f", "at most [%] .1f"), tuple(rows))
     verdict = (f"{counts['cases']} of {counts['asked']} cases were given to the lab, {seeds}, made by a simulator that "
                f"shares no code with it. By the measured shares, {met} of {len(rows)} goals are met; by the far end of "
                f"the 95 % interval, {surely} are. This examination is our own: nobody else has published one. As it "

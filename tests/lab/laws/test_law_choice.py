@@ -11,8 +11,7 @@ import pytest
 
 from logger.lab.laws import learn
 from logger.lab.laws.draft import LEARNED
-from logger.lab.laws.learn import DECISIVE, FamilySearch
-from logger.lab.laws.refusals import Refusal
+from logger.lab.laws.learn import DECISIVE, FamilySearch, Refusal
 from logger.lab.selection.stepwise import Search, SearchEffort
 from logger.vehicle.effect import ForceEffect, Misalignment, chosen
 from logger.vehicle.laws import CornerLaws

@@ -13,7 +13,7 @@ from logger.lab.laws.draft import Draft, Family, LawContext
 from logger.lab.laws.families.damping_by_travel import FAMILY as BY_BOTH
 from logger.lab.laws.families.force_by_rate import FAMILY as BY_RATE
 from logger.lab.laws.families.record_factor import FAMILY as FACTOR
-from logger.lab.laws.refusals import Nearest, _beyond, does_nothing, known_instead, refusal
+from logger.lab.laws.learn import Nearest, _beyond, does_nothing, known_instead, refusal
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import fit
 from logger.lab.likelihood.posterior import Posterior

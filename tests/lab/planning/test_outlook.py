@@ -7,8 +7,16 @@ import pytest
 
 from logger.arrays import Array
 from logger.lab.likelihood.priors import Tolerance, VehiclePrior
-from logger.lab.planning.outlook import EffectGrid, outlook, representatives
-from logger.lab.planning.planned_drive import FisherInformation, PlannedCar, PlannedDrive, SensorNoise, at_speed
+from logger.lab.plan import (
+    EffectGrid,
+    FisherInformation,
+    PlannedCar,
+    PlannedDrive,
+    SensorNoise,
+    at_speed,
+    outlook,
+    representatives,
+)
 from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.shipped import vehicle_file

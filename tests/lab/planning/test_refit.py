@@ -7,8 +7,7 @@ import pytest
 
 from logger.arrays import Array
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.planning.outlook import LinearisedDrives, refitted_gain
-from logger.lab.planning.planned_drive import PlannedDrive
+from logger.lab.plan import LinearisedDrives, PlannedDrive, refitted_gain
 
 from .test_outlook import planned
 

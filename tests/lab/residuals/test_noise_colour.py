@@ -10,7 +10,7 @@ from scipy.signal import lfilter
 from logger.api.lab.diagnose import diagnosis_summary
 from logger.lab.diagnosis import diagnose
 from logger.lab.likelihood.noise_floor import growing_power, steady_power
-from logger.lab.residuals.noise_colour import is_monotonic, rising_levels
+from logger.lab.residuals.unexplained import is_monotonic, rising_levels
 from logger.runs import Run
 from logger.simulation.virtual_drive import SimulatedRuns
 

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.lab.residuals.sensor_drift import Drift, drift_of
+from logger.lab.residuals.unexplained import Drift, drift_of
 from logger.profiles.track import Track
 from logger.runs import RecordFacts, Run
 

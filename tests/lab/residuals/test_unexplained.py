@@ -8,8 +8,7 @@ import pytest
 from logger.api.lab.words import line_sentence, looks_like
 from logger.lab.diagnosis import refit
 from logger.lab.residuals.breakdown import ModelResiduals
-from logger.lab.residuals.removed import removed_from
-from logger.lab.residuals.unexplained import shape_of, spatial_line_of
+from logger.lab.residuals.unexplained import removed_from, shape_of, spatial_line_of
 from logger.runs import Run
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import compose

@@ -14,17 +14,20 @@ from logger.identification.unknown_road.marginal_likelihood import at_n0
 from logger.identification.unknown_road.road_operator import Crossing, RoadDrive, grid_under
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.unknown_road.diagnosis import SharedRoadCandidate, UnknownRoadDiagnosis, diagnose_same_road
-from logger.lab.unknown_road.fit import fit, screen
-from logger.lab.unknown_road.likelihood import (
+from logger.lab.unknown_road.same_road import (
     DriveConditions,
     NotOneRoad,
     RoadFitState,
     SameRoad,
     Tabulated,
+    certain_two_roads,
+    fit,
+    possible_two_roads,
     response_of,
     responses_of,
+    road_agreements,
+    screen,
 )
-from logger.lab.unknown_road.one_road import certain_two_roads, possible_two_roads, road_agreements
 from logger.profiles.track import Track
 from logger.roads.iso8608 import CM3_M3, generate
 from logger.runs import Run

@@ -9,9 +9,7 @@ import pytest
 
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.unknown_road.diagnosis import diagnose_same_road
-from logger.lab.unknown_road.fit import fit
-from logger.lab.unknown_road.likelihood import SameRoad
-from logger.lab.unknown_road.one_road import placed_by_road
+from logger.lab.unknown_road.same_road import SameRoad, fit, placed_by_road
 from logger.runs import Run
 from logger.store.formats.effect_file import shipped_effects
 

@@ -16,8 +16,8 @@ from pathlib import Path
 
 import numpy as np
 
-from logger.api.csv_extraction import CsvSettings, recorded_csv
 from logger.api.datasets.lira_map import ProfilerPass
+from logger.api.extraction import CsvSettings, recorded_csv
 from logger.errors import BadInput
 from logger.files import json_sha256
 from logger.fleet.dataset import Dataset

@@ -13,10 +13,30 @@ Effects with which a car is not linear are tried by the linear cars that come ne
 each drive over each stretch, as each moves it by another amplitude: what friction does is then no damping, but one that
 falls from stretch to stretch as the motion grows. What a free road absorbs (a gain; a longer contact patch) is known
 from the information that remains of an effect once the road is integrated out.
+
+Fits of a model to drives over an unknown road, by Fisher scoring, and score tests of effects on top of one.
+
+Drives over one road: a test whether they are, and the distance that all are laid on.
+
+Problem: drives over two roads disagree whatever the car, and a search for what a model lacks then finds effects that
+imitate the disagreement. The size of the residual cannot decide: a car that lacks something has a large one as well.
+Solution: the record that one drive predicts is correlated with another drive's. Over one road they correlate, through a
+wrong car as well, if less; over two roads only by chance, which is measured at lags far apart. Both are divided by the
+spectrum and by the envelope of what was read, so that neither a resonance of the car nor a bump dominates. A car that
+lacks much may correlate with nothing: before drives are rejected, the car is tried with each of the effects that it may
+lack. Where one road would not be significant either, the pair is reported as doubtful.
+
+A receiver's speeds put a drive on the road to a tenth of a metre within some seconds and to metres within a
+minute, each drive differently. At the frequency of the wheels' bounce that is a wave of the road, and effects that damp
+it or delay the record imitate the blur. So the record of each drive is compared, window by window, with what the
+others make a model of the car expect there (``lab.likelihood.lag``), and its distances are moved by the lags, again and
+again until these are small. A delay of the record moves with them: of such drives it cannot be distinguished from the
+receiver's.
 """
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
@@ -27,6 +47,8 @@ import numpy as np
 
 from logger.arrays import Array, Complex
 from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM
+from logger.fitting.fisher_scoring import maximise
+from logger.fitting.information_matrix import inverse
 from logger.identification.unknown_road.marginal_likelihood import (
     OFFSET,
     WAVINESS,
@@ -38,17 +60,27 @@ from logger.identification.unknown_road.marginal_likelihood import (
     displacement_psd_m3,
 )
 from logger.identification.unknown_road.road_operator import RoadDrive
+from logger.lab.likelihood.lag import lags
+from logger.lab.likelihood.map_fit import ends_of
 from logger.lab.likelihood.noise_floor import NoiseLevel, sensor_noise
 from logger.lab.likelihood.priors import Tolerance, VehiclePrior
 from logger.lab.likelihood.whittle import DISCREPANCY, Bands
+from logger.lab.selection.screening import scale_strength
 from logger.roads.iso8608 import STANDARD_WAVINESS
 from logger.runs import Run, normalised_rms
 from logger.vehicle.compose import Car, compose
-from logger.vehicle.effect import Chosen
+from logger.vehicle.effect import Chosen, Scale
 from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.linearise import is_linear, known_car, linearised
-from logger.vehicle.named_parameters import Free
-from logger.vehicle.simulate import recorder_gain
+from logger.vehicle.named_parameters import (
+    Free,
+    FreeParameter,
+    coordinates_of,
+    free_parameters_of,
+    steps_of,
+    with_coordinates,
+)
+from logger.vehicle.simulate import PASS_OF_RATE, recorder_gain
 from logger.vehicle.structure import Output
 from logger.vehicle.vehicle import Vehicle
 
@@ -410,3 +442,297 @@ def _joined(run: Run, parts: Sequence[Array]) -> Run:
     """Residuals of parts of a run, as a run."""
     residual = np.concatenate([np.zeros(run.first), *parts])
     return replace(run.part(slice(len(residual))), measured_mps2=residual)
+
+
+@dataclass(frozen=True, eq=False)
+class SameRoadFit:
+    """A fitted state, with the information on its numbers.
+
+    free_parameters    of its effects
+    data               information of the drives on the logs, the free parameters (on their scales) and the roads'
+                       numbers (m, m), at the last step for which it was computed
+    information        of drives and priors (m, m)
+    problem            with a preconditioner for states near this one
+    """
+
+    state: RoadFitState
+    free_parameters: tuple[FreeParameter, ...]
+    data: Array
+    information: Array
+    problem: SameRoad
+
+
+def fit(problem: SameRoad, state: RoadFitState, steps: int = 10, close: float = 0.3) -> SameRoadFit:
+    """Fit the most probable state, by so many scoring steps from a state at most.
+
+    close    standard errors from the end that are near enough
+    """
+    free_parameters = free_parameters_of(state.effects)
+    p, q = len(state.logs), len(free_parameters)
+    start = np.concatenate([state.logs, coordinates_of(state.effects, free_parameters), state.roads])
+    low, high, longest = _limits(state.effects, free_parameters, len(start), p)
+    low[-1] = np.log(problem.least_mps2)
+    probes = 1 if len(problem.stretches) > 2 else None  # where there are many stretches, these are a mean as well
+    rounds = 0
+
+    def at(x: Array) -> tuple[Array, tuple[Chosen, ...], Array]:
+        return x[:p], with_coordinates(state.effects, free_parameters, x[p : p + q]), x[p + q :]
+
+    def score(x: Array, information: bool) -> RoadsScore:
+        nonlocal problem, rounds
+        logs, effects, roads = at(x)
+        gains, slopes = response_and_slopes(problem, effects, free_parameters, logs)
+        if rounds > 8:  # a new preconditioner takes about as long
+            problem = problem.preconditioned(RoadFitState(effects, logs, roads, gains))
+        found = problem.score(problem.tables(gains, slopes), roads, information, probes)
+        rounds = found.rounds
+        off, precision = problem.prior_terms(logs, q, roads)
+        return replace(found, slopes=found.slopes - precision * off, information=found.information + np.diag(precision))
+
+    found = maximise(score, start, low, high, longest, close=close, most_steps=steps)
+    logs, effects, roads = at(found.x)
+    fitted = RoadFitState(effects, logs, roads, problem.response(effects, logs))
+    _, precision = problem.prior_terms(logs, q, roads)
+    return SameRoadFit(fitted, tuple(free_parameters), found.information - np.diag(precision), found.information,
+                       problem)
+
+
+def response_and_slopes(problem: SameRoad, effects: tuple[Chosen, ...], free_parameters: Sequence[FreeParameter],
+                        logs: Array, step: float = 1e-3) -> tuple[Complex, Complex]:
+    """A response (d, x, f) and its derivatives (p + q, d, x, f) by the logs and the free parameters, over steps of this
+    share."""
+    gains, p = problem.response(effects, logs), len(logs)
+    here = np.concatenate([logs, coordinates_of(effects, free_parameters)])
+    steps = np.concatenate([np.full(p, step), steps_of(effects, free_parameters, step, step)])
+    slopes = [(problem.response(with_coordinates(effects, free_parameters, there[p:]), there[:p]) - gains) / one
+              for there, one in zip(here + np.diag(steps), steps, strict=True)]
+    return gains, np.array(slopes).reshape(len(slopes), *gains.shape)
+
+
+def _limits(effects: Sequence[Chosen], free_parameters: Sequence[FreeParameter], count: int, first: int
+            ) -> tuple[Array, Array, Array]:
+    """Bounds and longest step of each number (count,); those of the free parameters begin at ``first``."""
+    low, high, longest = np.full(count, -np.inf), np.full(count, np.inf), np.full(count, 0.5)
+    for index, free in enumerate(free_parameters, first):
+        parameter = effects[free.effect].effect.parameters[free.parameter]
+        low[index], high[index] = ends_of(parameter)
+        if parameter.scale is not Scale.LOG:
+            longest[index] = max(parameter.usual_range(), 0.5 * abs(coordinates_of(effects, [free])[0]))
+    return low, high, longest
+
+
+@dataclass(frozen=True, eq=False)
+class TrialOnRoad:
+    """An effect at some values on top of a model.
+
+    gain                 expected, in minus twice the log-likelihood
+    best                 the effect at its best strength, which has this gain
+    deviations           expected significance at its values, all free numbers fitted, in standard deviations
+    share_beyond_road    share of its information (0 to 1) that roads and places do not absorb
+    """
+
+    chosen: Chosen
+    gain: float
+    best: Chosen
+    deviations: float
+    share_beyond_road: float
+
+
+def screen(problem: SameRoad, base: SameRoadFit, ones: Sequence[Chosen]) -> list[TrialOnRoad]:
+    """Score tests of effects on top of a fitted model, along the change that each makes in the response; the car's
+    numbers and the roads' are projected out."""
+    state = base.state
+    gains, own = response_and_slopes(problem, state.effects, base.free_parameters, state.logs)
+    changes = [problem.response((*state.effects, one), state.logs) - gains for one in ones]
+    k, p = len(ones), len(own)
+    tables = problem.tables(gains, np.array([*own, *changes]))
+    scored = problem.score(tables, state.roads, information=True)
+    slopes, information = scored.slopes, scored.information
+    rest, road = np.r_[0:p, p + k : len(slopes)], np.arange(p + k, len(slopes))
+    off, precision = problem.prior_terms(state.logs, len(base.free_parameters), state.roads)
+    known = inverse(information[np.ix_(rest, rest)] + np.diag(precision))
+    by_road = inverse(information[np.ix_(road, road)] + np.diag(precision[p:]))
+    score = slopes[rest] - precision * off
+    found = []
+    for index, one in enumerate(ones, p):
+        alone, mixed = information[index, index], information[index, rest]
+        remaining = max(float(alone - mixed @ known @ mixed), 0.0)
+        with_road = information[index, road]
+        share = float(1 - with_road @ by_road @ with_road / alone) if alone > 0 else 0.0
+        slope = float(slopes[index] - mixed @ known @ score)
+        found.append(_trial(one, slope, remaining, alone, max(share, 0.0)))
+    return found
+
+
+def _trial(one: Chosen, slope: float, remaining: float, alone: float, share: float) -> TrialOnRoad:
+    """The trial at its best strength by its score and its information, as far as a quadratic is to be believed.
+
+    remaining, alone    its information with all free numbers projected out, and before; a share below 1e-4 is mostly
+                        rounding
+    """
+    if not remaining > 1e-4 * alone:
+        return TrialOnRoad(one, 0.0, one, 0.0, share)
+    strength = float(np.clip(slope / remaining, 0.03, 3.0))
+    scaled = scale_strength(one, strength)
+    if scaled is None:
+        strength, scaled = 1.0, one
+    gain = (2 * strength * slope - strength**2 * remaining) / (1 + 1 / PROBES)
+    return TrialOnRoad(one, gain, scaled, float(np.sqrt(remaining)), share)
+
+
+AGREEMENT_SIGMA = 5.0
+"""Standard deviations of chance from which on two drives are over one road: a p-value of 3e-7, and some hundred lags
+and tens of cars are tried."""
+
+
+@dataclass(frozen=True)
+class RoadAgreement:
+    """Correlation of one run with its prediction by another one, in standard deviations of chance.
+
+    run, by    numbers of the runs: the one that is predicted, and the one that predicts it
+    found      the correlation
+    expected   with a right model
+    """
+
+    run: int
+    by: int
+    found: float
+    expected: float
+
+    @property
+    def is_significant(self) -> bool:
+        """Whether the correlation is more than chance."""
+        return self.found > AGREEMENT_SIGMA
+
+
+def road_agreements(problem: SameRoad, state: RoadFitState, lacking: Sequence[Chosen] = ()) -> list[RoadAgreement]:
+    """Agreements of all pairs of runs that share some of the way, in either direction: by the car of a state and, where
+    that would mean two roads, with each of the effects that it may lack; the largest of these."""
+    found = _road_agreements(problem, state)
+    for one in lacking:
+        if certain_two_roads(found) is None:
+            break
+        effects = (*state.effects, one)
+        other = _road_agreements(problem, replace(state, effects=effects, gains=problem.response(effects, state.logs)))
+        found = [replace(old, found=max(old.found, new.found)) for old, new in zip(found, other, strict=True)]
+    return found
+
+
+def certain_two_roads(found: Sequence[RoadAgreement]) -> tuple[int, int] | None:
+    """The two runs that are most certainly over two roads; None if no two are."""
+    certain = {pair: most for pair, most in _disagreeing_pairs(found).items() if _is_certain(most)}
+    return max(certain, key=lambda pair: certain[pair]) if certain else None
+
+
+def possible_two_roads(found: Sequence[RoadAgreement]) -> list[tuple[int, int]]:
+    """Pairs of runs that may be over one road or two."""
+    return [pair for pair, most in _disagreeing_pairs(found).items() if not _is_certain(most)]
+
+
+def _is_certain(expected: float) -> bool:
+    """Whether one road would have shown: with twice what is significant, as drives that disagree show less than
+    half."""
+    return expected > 2 * AGREEMENT_SIGMA
+
+
+def _disagreeing_pairs(found: Sequence[RoadAgreement]) -> dict[tuple[int, int], float]:
+    """Pairs of runs of which neither predicts the other, with the agreement expected over one road."""
+    ways: defaultdict[tuple[int, int], list[RoadAgreement]] = defaultdict(list)
+    for one in found:
+        ways[min(one.run, one.by), max(one.run, one.by)].append(one)
+    return {pair: max(one.expected for one in both) for pair, both in ways.items()
+            if not any(one.is_significant for one in both)}
+
+
+def _road_agreements(problem: SameRoad, state: RoadFitState) -> list[RoadAgreement]:
+    """Agreements by the car of a state."""
+    parts: defaultdict[tuple[int, int], list[tuple[Array, Array]]] = defaultdict(list)
+    for run, by, read, predicted in problem.predicted_by_each(state):
+        parts[run, by].append((read, predicted))
+    return [_road_agreement(run, by, pairs, problem.rate_hz) for (run, by), pairs in parts.items()]
+
+
+def _road_agreement(run: int, by: int, pairs: Sequence[tuple[Array, Array]], rate_hz: float) -> RoadAgreement:
+    """The agreement of what was read and predicted (n,) over each stretch: the largest correlation within 0.05 s, as
+    places may be a little off, over the r.m.s. correlation beyond a second."""
+    near = round(0.05 * rate_hz)
+    correlation, chance, expected = np.zeros(2 * near + 1), 0.0, 0.0
+    for read, predicted in pairs:
+        ours, theirs = _spectrally_flat(read, predicted, rate_hz)
+        size = float(np.linalg.norm(ours))
+        share = min(1.0, float(np.linalg.norm(theirs)) / size) if size > 0 else 0.0
+        ours, theirs = (_envelope_flat(one, rate_hz) for one in (ours, theirs))
+        both = np.fft.irfft(np.fft.rfft(ours) * np.conj(np.fft.rfft(theirs)), len(ours))  # one for each shift
+        far = min(round(rate_hz), len(both) // 4)
+        chance += float((both[far:-far] ** 2).mean())
+        correlation += both[np.arange(-near, near + 1)]
+        expected += share * float(np.linalg.norm(ours) * np.linalg.norm(theirs))
+    deviation = float(np.sqrt(chance))
+    if not deviation > 0:  # nothing is predicted
+        return RoadAgreement(run, by, 0.0, 0.0)
+    return RoadAgreement(run, by, float(correlation.max()) / deviation, expected / deviation)
+
+
+def _spectrally_flat(read: Array, predicted: Array, rate_hz: float) -> tuple[Array, Array]:
+    """What was read and what was predicted (n,), tapered by a tenth at each end, both divided by the smoothed spectrum
+    of what was read, at the frequencies that the recorder passes."""
+    n = len(read)
+    ends = np.minimum(np.arange(n), np.arange(n)[::-1]) / (0.1 * n)
+    taper = np.sin(0.5 * np.pi * np.minimum(ends, 1.0)) ** 2
+    ours, theirs = (np.fft.rfft(taper * (one - one.mean())) for one in (read, predicted))
+    f_hz = np.fft.rfftfreq(n, 1 / rate_hz)
+    power = _smooth(np.abs(ours) ** 2, round(1.5 * n / rate_hz))
+    used = (f_hz >= 0.5) & (f_hz <= PASS_OF_RATE * rate_hz) & (power > 0)
+    gain = np.where(used, 1 / np.sqrt(np.where(used, power, 1.0)), 0.0)
+    return np.fft.irfft(gain * ours, n), np.fft.irfft(gain * theirs, n)
+
+
+def _envelope_flat(samples: Array, rate_hz: float) -> Array:
+    """Samples (n,) over their envelope, the r.m.s. of half a second: two roads with a bump at about one place are
+    two roads all the same."""
+    envelope = np.sqrt(_smooth(samples**2, round(0.5 * rate_hz)))
+    return np.asarray(samples / np.maximum(envelope, 1e-300))
+
+
+def _smooth(power: Array, width: int) -> Array:
+    """Moving average (n,) over so many samples."""
+    width = max(1, width)
+    around = np.pad(power, width, mode="reflect")
+    return np.asarray(np.convolve(around, np.ones(width) / width, "same")[width:-width])
+
+
+def placed_by_road(runs: Sequence[Run], vehicle: Vehicle, tolerance: Tolerance, present: Sequence[Chosen] = (),
+                   start_vehicle: Vehicle | None = None, rounds: int = 8) -> list[Run]:
+    """Runs with the distances at which the others agree with them, but for a constant of some metres, which is a number
+    of the road (``RoadFitState.roads``). The first stays where it is; where windows do not correlate, so does the run.
+
+    rounds    so many at most
+
+    NotOneRoad, ValueError as ``SameRoad`` and its ``start``.
+    """
+    found = list(runs)
+    for _ in range(rounds):
+        problem = SameRoad(found, vehicle, tolerance, start_vehicle)
+        offsets_m = _offsets(problem, present)
+        found = [replace(run, distance_m=run.distance_m + off_m)
+                 for run, off_m in zip(found, offsets_m, strict=True)]
+        # A fiftieth of the shortest wave that a car feels: no larger than the errors of lags.
+        if np.sqrt(np.mean(np.concatenate(offsets_m[1:]) ** 2)) < 0.01:
+            break
+    return found
+
+
+def _offsets(problem: SameRoad, present: Sequence[Chosen]) -> list[Array]:
+    """By how much each run's distances (n,) are short [m], of the first nothing."""
+    predictions = [np.zeros(run.count) for run in problem.runs]
+    ways = [np.maximum.accumulate(run.distance_m) for run in problem.runs]
+    drives = [drive for parts in problem.stretches for _, drive in parts]
+    for drive, (number, _, expected) in zip(drives, problem.predicted_by_others(problem.start(present)), strict=True):
+        first = int(np.searchsorted(ways[number], drive.distance_m[0]))
+        predictions[number][first : first + len(expected)] = expected
+    found = [np.zeros(problem.runs[0].count)]
+    for run, prediction in list(zip(problem.runs, predictions, strict=True))[1:]:
+        windows = lags([run], [prediction])
+        found.append(np.interp(np.arange(run.count), windows.middle, -windows.lag_m) if len(windows.run)
+                     else np.zeros(run.count))
+    return found
