@@ -69,7 +69,7 @@ def test_counts_of_the_examination_are_those_of_its_page() -> None:
     counts = measurements.examined()
     page = (Path(__file__).parents[2] / "docs" / "examination.md").read_text("utf-8")
     assert page.startswith(f"# The lab examined\n\n{counts['cases']} random cases")
-    assert f"seeds {counts['first_seed']} to {counts['last_seed']}" in page
+    assert f"seeds, {counts['first_seed']} to {counts['last_seed']}," in page
     asked = [one for one in counts["goals"] if one["of"]]
     assert asked
     for goal in asked:
