@@ -46,6 +46,7 @@ if TYPE_CHECKING:
 
 _TRIM_THRESHOLD, _MMAP_THRESHOLD, _ARENA_MAX = -1, -3, -8  # of mallopt(3), in glibc's malloc.h
 
+
 class QuestionVerb:
     """A verb that is declared by its question, or verbs below it by theirs, as the modules of this folder declare
     one."""

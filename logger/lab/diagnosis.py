@@ -257,7 +257,7 @@ def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present:
     forces = [one for one in search.effects if isinstance(one, ForceEffect)]
     if posterior.vehicle.model != "component" or not forces:
         return search, search.run(before)
-    by_forces = replace(search, effects=forces)
+    by_forces = replace(search, effects=forces, _promising=set(), _rivals={})
     selection = by_forces.run(before)
     if not exceeds_noise(selection.now):
         together = search.run(before)

@@ -309,6 +309,13 @@ def test_wrong_use_is_one_line(runs: list[str], free: str, more: tuple[str, ...]
         identify(runs, free, *more)
 
 
+def test_both_axles_stay_within_the_ranges_that_the_file_gives_of_them(
+        runs: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert identify(runs[:1], DAMPERS, "--json", vehicle=car_of(tmp_path, "875", dampers="[1500, 1700]")) == 0
+    reported = json.loads(capsys.readouterr().out)
+    assert reported["bounds"][DAMPERS] == [1500, 1700] and reported["at_bound"] == [DAMPERS]
+
+
 def test_a_run_that_was_given_twice(runs: list[str]) -> None:
     with pytest.raises(BadInput, match="expected every run once, found it twice"):
         identify([runs[0], runs[1], f"{runs[0]}/."], MASS)

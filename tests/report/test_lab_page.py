@@ -73,4 +73,4 @@ def test_no_column_of_a_table_is_empty(found: LabComparison) -> None:
                                  ("By band", "By speed", "By amplitude of the motion"))
     for table in (bands, speeds):
         assert ">unchanged<" in table and "<td class=n></td>" not in table
-    assert ">filed<" not in amplitudes or "<td class=n></td>" not in amplitudes
+    assert ">unchanged<" not in amplitudes or "<td class=n></td>" not in amplitudes

@@ -281,9 +281,14 @@ def _with_unknown_numbers(given: vehicle_file.CarModel, word: str, question: Ide
 
 
 def _ranges(given: vehicle_file.CarModel, records: Sequence[Record]) -> dict[str, tuple[float, float]]:
-    """The ranges that the vehicle's file gives; a preload is at most as large as what was measured, either way."""
+    """The ranges that the vehicle's file gives, of both axles together where theirs overlap; a preload is at most twice
+    as large as what was measured, either way."""
     most_n = 2 * max(float(np.abs(record.measured_mps2).max()) for record in records)
-    return {PRELOAD: (-most_n, most_n)} | {name: one.ends for name, one in given.known.items() if one.ends}
+    ends = {name: one.ends for name, one in given.known.items() if one.ends}
+    front, rear = (f"{axle}." for axle in AXLES)
+    both = {name.replace(front, f"{BOTH}."): (max(low, other[0]), min(high, other[1])) for name, (low, high)
+            in ends.items() if name.startswith(front) and (other := ends.get(name.replace(front, rear)))}
+    return {PRELOAD: (-most_n, most_n), **both, **ends}
 
 
 def _in_words_of(records: Sequence[Record], line: str) -> str:

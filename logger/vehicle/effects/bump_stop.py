@@ -1,7 +1,7 @@
-"""A rubber stop ends the way of a suspension in compression, and maybe another one that in extension.
+"""Rubber stops end the travel of a suspension, in compression and, where there is one, in extension.
 
-Beyond a clearance c of compression from rest it adds the force k (compression - c); in extension, beyond a clearance of
-its own, with the same stiffness.
+Beyond a clearance c of compression from rest a stop adds the force k (compression - c). One in extension has a
+clearance of its own and the same stiffness k.
 """
 
 from __future__ import annotations
