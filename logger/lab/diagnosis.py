@@ -252,7 +252,7 @@ def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present:
     Of a part on its bench the forces are sought first. What changes any force, as a sensor or the mass of a fixture
     does, imitates some of any memory. Where forces leave something, it is sought on top, and found where nothing
     is left with it. Where they leave nothing, all are sought together as well, and the likelier end is taken: a mount
-    that gives imitates a delay."""
+    that gives imitates a delay. The first round is that of all effects in any case."""
     search, before = begin_search(posterior, effects, present, progress, effort)
     forces = [one for one in search.effects if isinstance(one, ForceEffect)]
     if posterior.vehicle.model != "component" or not forces:
@@ -261,9 +261,10 @@ def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present:
     selection = by_forces.run(before)
     if not exceeds_noise(selection.now):
         together = search.run(before)
-        return (by_forces, selection) if selection.now.score <= together.now.score else (search, together)
+        is_likelier = selection.now.score < together.now.score - INDISTINGUISHABLE
+        return search, replace(selection, first=together.first) if is_likelier else together
     wider, more = by_forces.with_more(selection, [one for one in search.effects if one not in forces])
-    return (by_forces, selection) if exceeds_noise(more.now) else (wider, more)
+    return wider, replace(selection, first=more.first) if exceeds_noise(more.now) else more
 
 
 def exceeds_noise(model: Baseline) -> bool:
