@@ -247,7 +247,9 @@ def scan(file: BinaryIO) -> Iterator[Row]:
         torn = len(text) == len(line) < LINE_BYTES
         if number == 1:
             if text != HEADER.encode():
-                yield from _salvaged(1, text.removeprefix(HEADER.encode()), torn)
+                # A row behind a header whose newline is damaged begins after that one byte.
+                rest = text[len(HEADER) + 1:] if text.startswith(HEADER.encode()) else text
+                yield from _salvaged(1, rest, torn)
                 yield Row(1, "", None, "expected the header line of a segment log", torn, len(text))
             continue
         try:

@@ -14,7 +14,7 @@ from logger.store.log.log_reader import read_logged
 from logger.store.log.log_writer import SegmentLog
 from logger.store.log.recovery import repair
 from logger.store.log.row_format import HEADER, format_row, parse_row, read_log
-from logger.store.log.sidecar import ClockMap, read_sidecar
+from logger.store.log.sidecar import ClockMap, read_sidecar, sealed
 
 from .crashes import FACTS, OFFSET_US, problems, window
 from .disk_models import CrashModel, RecordingFiles, RefusingFiles, lay_out
@@ -154,7 +154,7 @@ def _session_image(rng: random.Random) -> tuple[dict[str, bytes], int]:
         is_open = part >= first_open
         image[f"00001-{part + 1:03d}.csv{'.part' * is_open}"] = "".join(f"{line}\n" for line in lines).encode()
         if not is_open:
-            image[f"00001-{part + 1:03d}.json"] = json.dumps({"log": {"rows": count}}).encode()
+            image[f"00001-{part + 1:03d}.json"] = json.dumps(sealed({"log": {"rows": count}})).encode()
     return image, segment
 
 
@@ -193,7 +193,7 @@ def both_damaged(folder: Path, case: tuple[int, int]) -> Found:
                 image[name] = damaged(image[name], rng)
         written = {line.encode(): max(0, place) for text in lines.values() for place, line in enumerate(text)}
         kept = {written.get(line, 0) for data in image.values() for line in data.split(b"\n")} - {0}
-        image["00001-001.json"] = json.dumps({"log": {"rows": len(rows)}}).encode()
+        image["00001-001.json"] = json.dumps(sealed({"log": {"rows": len(rows)}})).encode()
         after = lay_out(folder / "after", image)
         repair(after, RefusingFiles())
         logs = list(after.glob("*.csv"))
