@@ -284,8 +284,8 @@ def _other_roads(runs: SimulatedRuns, followed: _Followed, car: Car) -> Iterator
 
 
 def _follows(run: Run, car: Car, body_hz: Array) -> bool:
-    """Whether what drives a rig predicts its record, whatever its numbers are: at six samples a period of the fastest
-    bounce that its file may have, the least that tell one from its half."""
+    """Whether what drives a rig predicts its record, whatever its numbers are: at three samples a period of the upper
+    edge of the band around its bounce, one more than the two that any signal needs."""
     still = ModelResiduals([run], car, [np.zeros(run.count)], [])
     return chance_of_following(still, 3.0 * bounce_band_hz(body_hz)[1]) < FALSE_ALARM
 
