@@ -123,8 +123,8 @@ def bus_fault(error: OSError, chip: int) -> DeviceError:
     if error.errno in NOT_ACKNOWLEDGED:
         return NotPresent(f"nothing answers at I2C address 0x{chip:02X}: check the sensor's power, ground, SDA and SCL")
     if error.errno == errno.ETIMEDOUT:
-        return Timeout(f"I2C transfer with 0x{chip:02X} timed out: the bus is held low; check SDA and SCL, and take "
-                       "the sensor's power away for a moment if it stays")
+        return Timeout(f"I2C transfer with 0x{chip:02X} timed out: the bus is held low; check SDA and SCL, and if this "
+                       "persists, unplug the sensor's power for a moment")
     if error.errno == errno.EBUSY:
         return NotPresent(f"a kernel driver owns I2C address 0x{chip:02X}: unload it (see lsmod) or remove its "
                           "overlay, or read the sensor through it (driver: iio)")

@@ -40,7 +40,7 @@ class BytePort(Protocol):
 
 MODEL = "sys/firmware/devicetree/base/model"
 DEBUG = "ttyAMA10"
-SWITCH_ON = "switch the port on (sudo raspi-config, Interface Options, Serial Port: no login shell, but the hardware)"
+SWITCH_ON = "switch the port on (sudo raspi-config, Interface Options, Serial Port: login shell no, port hardware yes)"
 _SINCE_5 = ("Raspberry Pi 5", "Raspberry Pi Compute Module 5")  # "Raspberry Pi 500" begins so too
 _ON_THE_PINS = "pins 8 and 10 of a {model} are /dev/ttyAMA0: write dtparam=uart0=on into /boot/firmware/config.txt, " \
                "restart, and set the port to /dev/ttyAMA0"
@@ -260,7 +260,7 @@ def _serial_hint(error: Exception, path: str = "/dev/PORT") -> str:
             return "another program has it open (gpsd, a serial console, a second ridelog?)"
     reason = os.strerror(number) if number is not None else words_of(error)
     return (f"cannot be opened as a serial port: {reason}; unplug the device and plug it in again, and try another "
-            "cable or adapter if this stays")
+            "cable or adapter if this persists")
 
 
 def wait_readable(descriptor: int, timeout_s: float) -> bool:

@@ -621,10 +621,10 @@ class DatedSamples:
     def doubt(self, check: str) -> str:
         """What is wrong with the samples that come, and what to ``check``; empty: nothing."""
         if self.clock.refused_hz is not None:
-            return (f"it gives about {self.clock.refused_hz:.0f} samples a second, too few or unevenly, as where some "
-                    f"are lost; ridelog expects {self._rate_hz:g} and makes no rows from them. {check}")
+            return (f"it gives about {self.clock.refused_hz:.0f} samples a second, too few or too unevenly (some may "
+                    f"be lost); ridelog expects {self._rate_hz:g} and makes no rows from them. {check}")
         if self.clock.too_many_lost:
-            return f"too many samples are lost to locate each: ridelog makes no rows from the others. {check}"
+            return f"so many samples are lost that ridelog cannot locate them, and makes no rows from the rest. {check}"
         if self.clock.lost_share >= WORTH_TELLING:
             return f"{100 * self.clock.lost_share:.1f} of 100 samples are lost, and their rows flagged gap. {check}"
         if self.burst_s < LONGEST_BURSTS_S:

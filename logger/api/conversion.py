@@ -69,7 +69,7 @@ def convert(question: ConvertQuestion) -> Conversion:
 def _ways(files: Sequence[LoggedFile], roads: Path | str) -> Layer:
     layer = smoothness_layer([one for file in files for one in file.records], read_map_ways(roads))
     if not layer.features:
-        raise BadInput(f"{roads}: expected ways that these logs passed with an IRI, found none")
+        raise BadInput(f"{roads}: expected ways along which these logs have an IRI, found none")
     return layer
 
 

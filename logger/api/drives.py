@@ -126,7 +126,7 @@ def _let_go(run: Run, notify: Notify) -> Run:
     if not first:
         return run
     later_s = first / run.rate_hz
-    notify(f"{run.path}: held still for its first {later_s:.3g} s: used from where it begins to move")
+    notify(f"{run.path}: held still for its first {later_s:.3g} s, which are left out")
     columns: dict[str, Any] = {name: one[first:] for name, one in vars(run).items() if isinstance(one, np.ndarray)}
     return replace(run, **columns, more={name: one[first:] for name, one in run.more.items()},
                    excitation=run.excitation and run.excitation.begun(later_s))
@@ -423,7 +423,7 @@ def blocks(found: Assessment, summary: dict[str, Any]) -> Iterator[Block]:
         return
     limit = summary["limit"]
     limits = [
-        "The limit, an estimator that knows road, car and noise exactly: standard error "
+        "The limit (of an estimator that knows road, car and noise exactly): standard error "
         f"{limit['std_m_per_km']:.2f} m/km at {summary['speed_mps']:.0f} m/s; R2 {limit['r2_iri_1_to_10']:.3f} over "
         f"roads of IRI {LEVELS_IRI[0]:g} to {LEVELS_IRI[-1]:g}, {limit['r2_this_road']:.3f} on a road like this one.",
         "Wavelengths resolved: " + _range_words(found),
@@ -479,8 +479,8 @@ def _range_words(found: Assessment) -> str:
     if road is None:
         return f"none over {RESOLVED_SHARE:.0%} of the drive."
     left_out = f"; {road.left_out_m:.0f} m in short stretches are left out" if road.left_out_m else ""
-    return (f"{road.shortest_m:.2g} to {road.longest_m:.3g} m (each end over {RESOLVED_SHARE:.0%} of the drive); "
-            f"a profile contains only these{left_out}.")
+    return (f"{road.shortest_m:.2g} to {road.longest_m:.3g} m (over {RESOLVED_SHARE:.0%} of the drive); "
+            f"the profile holds no others{left_out}.")
 
 
 def _table(summary: dict[str, Any]) -> Iterator[Block]:

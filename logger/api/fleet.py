@@ -182,7 +182,7 @@ def _car_of(log: Path) -> str:
     vehicle = content.get("vehicle") if isinstance(content, dict) else None
     name = vehicle.get("name") if isinstance(vehicle, dict) else None
     if not isinstance(name, str) or not name:
-        raise BadInput(f"{log}: expected the car's name in the description beside it, or --car NAME")
+        raise BadInput(f"{log}: expected the car's name in the sidecar beside it, or --car NAME")
     if name == GENERIC:
         raise BadInput(f"{log}: expected the car's name, found {GENERIC}, no car in particular: --car NAME")
     return name

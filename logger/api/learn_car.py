@@ -383,7 +383,7 @@ def _check_car(problem: UnknownCar, car: LearnedCar) -> None:
     far = (car.x - problem.knowledge.mean)[kept]
     if far @ np.linalg.solve(problem.knowledge.covariance[np.ix_(kept, kept)], far) > _NO_CAR:
         most = max(kept, key=lambda at: abs(off[at]))
-        raise CheckFailed(f"learn-car: no car responds to roads like these drives: {_words_of(NUMBERS[most])} would be "
+        raise CheckFailed(f"learn-car: no car fits these drives: {_words_of(NUMBERS[most])} would be "
                           f"{abs(off[most]):.1f} standard deviations from that of published cars. Is vertical_axis the "
                           "one that points up, is the sensor bolted to the body, were they driven without a trailer?")
 

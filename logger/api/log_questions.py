@@ -203,8 +203,8 @@ class IngestQuestion(LogsQuestion):
     to: Annotated[Path | str, Option("folder of the dataset; made if needed", metavar="DATASET", read=Path)]
     _: KW_ONLY
     car: Annotated[str | None, Option(
-        "the car's name (default: the vehicle's name in the description beside each log; give one where cars share "
-        "it)", metavar="NAME")] = None
+        "the car's name (default: the vehicle's name in the sidecar of each log; give one where cars share it)",
+        metavar="NAME")] = None
     car_folders: Annotated[bool, Option("each car has its own folder of logs, named after the car")] = False
     roads: Annotated[Path | str | None, Option(
         "map of the roads to which windows are assigned, at the first ingest (default: squares of 66 ft on the "

@@ -42,8 +42,8 @@ class ExportQuestion(Question):
                                              read=Path)] = None
     removed: Annotated[bool, Hidden("the stick was pulled, and ridelog status no longer shows it")] = False
     mounted: Annotated[bool, Hidden("copy only if DIR is a mount point")] = False
-    note: Annotated[Path | None, Hidden("the file of the note", read=Path)] = None
-    led: Annotated[Path | None, Hidden("the light that shows the notes, /sys/class/leds/NAME", read=Path)] = None
+    note: Annotated[Path | None, Hidden("file to write the note to", read=Path)] = None
+    led: Annotated[Path | None, Hidden("the LED that shows the notes, /sys/class/leds/NAME", read=Path)] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()

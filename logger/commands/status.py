@@ -103,7 +103,7 @@ def _storage_advice(storage: StorageStatus) -> list[str]:
                 "happens again, the card is dying: replace it")
         if storage.trouble.startswith(READ_ONLY):
             # a service that was started on it sees it through a mount of its own, which stays read-only
-            cure = ("Mount it writable (sudo mount -o remount,rw /); if this stays: sudo systemctl restart ridelog. "
+            cure = ("Mount it writable (sudo mount -o remount,rw /); if this persists: sudo systemctl restart ridelog. "
                     "If it happens again, copy the logs away (plug in the USB stick): the card is dying, replace it")
         steps.append(f"Log: not written for {_span(storage.since_s)}: {storage.trouble}. {storage.rows_waiting} rows "
                      f"wait in memory and are lost if the power goes. {cure}.")

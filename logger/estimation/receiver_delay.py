@@ -197,7 +197,7 @@ def _added(known: DelayInformation, block: BlockInformation) -> DelayInformation
 def estimate(known: DelayInformation) -> DelayEstimate:
     """The delay that fits best, or why there is none."""
     if known.blocks < FEWEST_BLOCKS:
-        return DelayEstimate(reason="too little has been driven")
+        return DelayEstimate(reason="not enough driving yet")
     a, b = known.a.sum(axis=0), known.b.sum(axis=0)
     found = _lowest(a, b, known.gravity)
     if found is None:

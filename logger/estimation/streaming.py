@@ -155,7 +155,7 @@ class RoadEstimator:
         noise_log_std: float = 0.0,
     ) -> None:
         if reads > 1 and not sensor.is_coarse:
-            raise ValueError("expected one reading per sample, for the noise blurs the steps")
+            raise ValueError("expected one reading per sample, as the noise blurs the steps")
         self._reads = reads
         self._car, self._off, self._is_measured = car, tuple(off), is_measured
         self._driven_share = driven_share

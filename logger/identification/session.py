@@ -54,7 +54,7 @@ def located(vehicle: Vehicle, record: Run, road: RoadInput, part: str) -> float:
     if not np.ptp(way_m) > 0:
         raise ValueError(f"{part}: expected a drive over it, found a car that stands")
     if count > _MOST_PLACES:
-        raise ValueError(f"{part}: expected a start_m, as {last_m - first_m:g} m are too long to look for it")
+        raise ValueError(f"{part}: expected a start_m, as {last_m - first_m:g} m is too long to search for it")
     without: dict[str, Any] = {part: None}
     bare = DriveModel(vehicle, [], [record], replace(road, **without)).predict(np.empty(0))[0]
     left = np.concatenate([np.zeros(record.first), record.kept_mps2 - bare])

@@ -72,7 +72,7 @@ def find_modes(samples: Array, rate_hz: float, inputs: Array | None = None, deca
         return decay_modes(samples, rate_hz, proposals, how)
     scale = samples.std(axis=0)
     if np.linalg.eigvalsh(np.corrcoef(samples.T).reshape(2 * (samples.shape[1],))).min() < subspace.RIDGE:
-        raise ValueError("expected channels that differ, found one that is a sum of others: leave it out")
+        raise ValueError("expected channels that differ, found one that is a combination of others: leave it out")
     whole = samples if inputs is None else np.hstack([samples, inputs])
     plan = _plan((whole - whole.mean(axis=0)) / whole.std(axis=0), samples.shape[1], rate_hz)
     segments = segment_products(plan.data, plan.lags, min(most_segments, len(samples) // (2 * plan.lags)))

@@ -84,7 +84,7 @@ def pieces_of(samples: Array, speed_mps: Array, usable: Bools, rate_hz: float) -
     fit = usable & (speed_mps >= standing_mps)
     starts = [at for at in range(0, len(samples) - count + 1, count // 2) if fit[at:at + count].all()]
     if len(starts) < least_pieces:
-        raise ValueError(f"expected at least {least_pieces} stretches of {_PIECE_S:g} s, each half over the last, at "
+        raise ValueError(f"expected at least {least_pieces} stretches of {_PIECE_S:g} s, overlapping by half, at "
                          f"{standing_mps:g} m/s or faster, found {len(starts)}")
     index = np.array(starts)[:, None] + np.arange(count)
     cut = samples[index] - samples[index].mean(axis=1, keepdims=True)

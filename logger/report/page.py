@@ -220,7 +220,7 @@ def _notes_section(summary: DriveSummary, files: Sequence[LoggedFile]) -> doc.Ht
     damaged = sum(file.damaged_lines for file in files)
     notes += [_warning(words) for words in notices(files)]
     if missing:
-        notes.append(_warning("Without their description (.json):") + f" {', '.join(missing[:20])}")
+        notes.append(_warning("Logs without a sidecar (.json):") + f" {', '.join(missing[:20])}")
     if lost:
         notes.append(_warning("Their settings were lost before a repair:") + f" {', '.join(lost[:20])}")
     if damaged:

@@ -651,7 +651,7 @@ def measures(lat_deg: Array, lon_deg: Array, begin_m: float | None, end_m: float
     order = np.argsort(at_m)
     at_m, known_m = at_m[order], post_m[order]
     if (np.diff(at_m) < shortest_m).any() or (np.diff(known_m) <= 0).any():
-        raise ValueError("expected kilometre posts that follow each other along the line by increasing numbers")
+        raise ValueError("expected kilometre posts with increasing numbers along the line")
     measured = np.interp(length_m, at_m, known_m)
     return measured + np.minimum(length_m - at_m[0], 0.0) + np.maximum(length_m - at_m[-1], 0.0)
 

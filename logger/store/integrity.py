@@ -178,7 +178,7 @@ def _check_log(path: Path) -> _Log:
     if not findings.records_good and not log_name(path) and (lines or empty):
         raise BadInput(f"{path}:1: expected a segment log or a recorded dump, found no row of one")
     if (before := name_before(path.name)) is not None:
-        findings.note(f"an export renamed it from {before}, as another log had that name: it is a drive of its own")
+        findings.note(f"an export renamed it from {before}, as another log had that name: it is a different drive")
     if not _is_part(path):
         if empty:
             findings.wrong("line 1: torn: expected the header line of a segment log")

@@ -18,7 +18,7 @@ from .figures import Figures
 GOALS = {
     "silverbox": {"Silverbox multisine, r.m.s. error [mV]": 1.0, "Silverbox arrow, r.m.s. error [mV]": 1.0,
                   "Silverbox arrow without extrapolation, r.m.s. error [mV]": 0.8},
-    "emps": {"error of the force over the force": 0.04, "mass [kg]": 0.01, "viscous friction [N s/m]": 0.01,
+    "emps": {"NRMSE of the force": 0.04, "mass [kg]": 0.01, "viscous friction [N s/m]": 0.01,
              "Coulomb friction [N]": 0.01},
 }
 """Of an error its most; of a number how far it may be from the published one, as a share."""

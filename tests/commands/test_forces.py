@@ -871,7 +871,7 @@ def test_what_a_file_does_not_know_is_found(tmp_path: Path, capsys: pytest.Captu
     one = identified(capsys, part, run, "--free", "stiffness_n_per_m")
     assert set(one["parameters"]) == set(found["parameters"])
     part.write_text("name: part\nmodel: component\ndamping_n_s_per_m: 1\nstiffness_n_per_m: 2e4\n")
-    with pytest.raises(BadInput, match=r"--free: expected the parameters to find, as .* gives all of them exactly"):
+    with pytest.raises(BadInput, match=r"--free: expected the parameters to fit, as .* gives all of them exactly"):
         main(["identify", "--vehicle", str(part), str(run)])
 
 

@@ -170,7 +170,7 @@ CHANGES = {
     "tiny": ({"accel": lambda a: 4e-6 * a}, "drive.csv: expected accelerations in m/s2, found none above"),
     "NaN": ({"accel": lambda a: np.where(a == a[500], np.nan, a)}, "drive.csv:502: expected a number for accel_z_mps2"),
     "gravity": ({"accel": lambda a: a + 9.81}, "drive.csv: expected gravity to be removed"),
-    "upside down": ({"accel": lambda a: -a}, "upside down: turned over, they follow the model"),
+    "upside down": ({"accel": lambda a: -a}, "upside down: with the sign changed they follow the model"),
     "in g": ({"accel": lambda a: a / 9.80665}, "expected accelerations in m/s2 .* the record seems to be in g"),
     "in mg": ({"accel": lambda a: a / 0.00980665 - np.mean(a / 0.00980665)},
               "the record seems to be in thousandths of g"),

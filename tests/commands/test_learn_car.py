@@ -82,7 +82,7 @@ def test_braking_that_is_read_as_up_and_down_is_refused(runs: list[Path], tmp_pa
         turned.append(folder)
     found = called("learn-car", *turned, "--wheelbase", 2.66)
     assert found.returncode == 1
-    assert "no car responds to roads like these drives" in found.stderr
+    assert "no car fits these drives" in found.stderr
 
 
 @pytest.mark.slow

@@ -69,7 +69,7 @@ def test_rows_are_as_the_format_says(replayed: tuple[Path, str]) -> None:
         body, _, check = line.rpartition(",")
         assert check == f"{zlib.crc32(body.encode()):08x}"
     assert outcome["receiver"]["delay_s"] is None  # a minute and a half: too short
-    assert outcome["receiver"]["unknown_because"] == "too little has been driven"
+    assert outcome["receiver"]["unknown_because"] == "not enough driving yet"
     assert outcome["receiver"]["mounting"] == []
     noise = outcome["noise"]
     assert noise["noise_drives"] == 1

@@ -56,7 +56,7 @@ def test_cars_of_lira_cd_find_the_profilers_iri(lira_cd: Path, capsys: pytest.Ca
     ten, hundred, repeats = reported(capsys, "lira-cd", lira_cd, "--vehicle", made.CAR)["tables"]
     assert ten["title"] == "Windows of 10 m"
     for table, r2 in ((ten, 0.8), (hundred, 0.9)):
-        found = rows(table, "car, moved along to fit")
+        found = rows(table, "car, shifted along the road to fit")
         assert set(found) == {"CPH1 HH", "CPH1 VH"}
         for row in found.values():
             assert row["R2"] > r2

@@ -97,7 +97,7 @@ def test_an_even_drive_tells_no_delay_and_says_why() -> None:
 def test_a_car_that_stands_tells_nothing() -> None:
     seen = town()
     alignment = fed(replace(seen, fix_speed_mps=np.zeros(len(seen.fix_speed_mps))))
-    assert alignment.estimate() == DelayEstimate(reason="too little has been driven")
+    assert alignment.estimate() == DelayEstimate(reason="not enough driving yet")
 
 
 def test_a_sensor_that_does_not_feel_the_car_tells_nothing() -> None:

@@ -187,7 +187,7 @@ def test_means_biases_and_changes_are_found_within_their_errors(tmp_path: Path, 
 
 @pytest.mark.parametrize(("arguments", "complaint"), [
     (["summarise", "nothing"], r"nothing: expected a dataset that 'ridelog fleet ingest' has made"),
-    (["ingest", "LOGS", "--to", "TOWN"], r"expected the car's name in the description beside it, or --car NAME"),
+    (["ingest", "LOGS", "--to", "TOWN"], r"expected the car's name in the sidecar beside it, or --car NAME"),
     (["summarise", "TOWN", "--by", "route"], r"--by route: expected a dataset made with --roads"),
     (["summarise", "TOWN", "--engine", "oracle"], r"--engine oracle: expected duckdb, spark://HOST:PORT"),
     (["summarise", "TOWN", "--since", "spring"], r"--since spring: expected a date such as 2026-04-30"),

@@ -137,7 +137,7 @@ def test_a_sensor_nobody_has_verified_is_said_so(drive) -> None:
     unverified = {**SIDECAR, "sensor": {"driver": "pasco", "profile": "ps2119", "verified": False}}
     text = text_of(page([LoggedFile("a.csv", drive(3), 0, unverified)]))
     assert "Sensor: pasco ps2119 . What its bytes mean is not verified" in text.replace("ps2119.", "ps2119 .")
-    assert "Without their description (.json): a.csv" in text_of(page([LoggedFile("a.csv", drive(3), 0, None)]))
+    assert "Logs without a sidecar (.json): a.csv" in text_of(page([LoggedFile("a.csv", drive(3), 0, None)]))
 
 
 def unpacked(block: dict[str, Any]) -> dict[str, list[float | None]]:

@@ -44,7 +44,7 @@ class Told(DriveAlignment):
 
 
 FOUND = Told(DelayEstimate(0.16, 0.015))
-NOTHING = Told(DelayEstimate(reason="too little has been driven"))
+NOTHING = Told(DelayEstimate(reason="not enough driving yet"))
 AUTO, SET = GpsConfig(), GpsConfig(latency_s=0.25)
 
 
@@ -164,7 +164,7 @@ def test_status_says_it_in_words(tmp_path: Path) -> None:
     first = ReceiverLearning(tmp_path, FOUND, UNKNOWN, None).words()
     assert first.endswith("learnt over 1 drive; from the next start on")
     assert ReceiverLearning(tmp_path, NOTHING, UNKNOWN, None).words() == \
-        "0.14 ± 0.07 s, assumed: too little has been driven"
+        "0.14 ± 0.07 s, assumed: not enough driving yet"
     assert ReceiverLearning(tmp_path, NOTHING, delay_at_start(SET, None), None).words() == "0.25 s by the settings"
 
 

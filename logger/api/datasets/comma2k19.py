@@ -116,10 +116,7 @@ STUDY = Study(
     "The segment is processed as any recording: extract --csv with the receiver's positions and speed, then estimate "
     "with the noise learnt. The device sat on the windscreen, where it feels pitch as well; the model's sensor sits "
     "in the middle, unless --vehicle names another car. This was run on the real minute.",
-    from_folder("comma2k19", _DOWNLOAD, run), (Item("comma2k19", Word.NOT_REPRODUCIBLE, "No IRI of this minute was "
-                                                                                        "published; the receiver's "
-                                                                                        "speed is later and higher "
-                                                                                        "than the car's, by the "
-                                                                                        "figures above."),),
+    from_folder("comma2k19", _DOWNLOAD, run), (Item("comma2k19", Word.NOT_REPRODUCIBLE,
+    "No IRI of this minute was published; the receiver's speed lags the car's and exceeds it, by the figures above."),),
     source="Schafer et al., arXiv:1812.05752, 2018", data=f"comma2k19 ({_DOWNLOAD})")
 STUDIES = (STUDY,)

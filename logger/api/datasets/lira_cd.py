@@ -82,8 +82,8 @@ def run(folder: Path, effort: Workload) -> Result:
     return Result(tuple(tables), data_sets.verdict_of(parts, refused, _CEILING), pictures)
 
 
-_CEILING = ("The profilers against each other are the ceiling: no car can agree better with one of them than the other "
-            "does.")
+_CEILING = ("How well the profilers agree with each other is the ceiling: no car can be shown to agree better with one "
+            "of them than the other does.")
 
 
 # --- files ---
@@ -209,8 +209,8 @@ def _beside(road: ProfiledRoad, drives: list[data_sets.DrivenWindows], window_m:
         "begin_m", "end_m", "iri_m_per_km", "iri_std_m_per_km"))
     edges_m = road.edges_m - road.edges_m[0]
     theirs = mean_between(edges_m, road.iri_m_per_km, begin_m, end_m)
-    return data_sets.Compared(road.name, window_m, begin_m, iri, std, theirs, "car, moved along to fit" if moved
-                              else "car")
+    return data_sets.Compared(road.name, window_m, begin_m, iri, std, theirs,
+                              "car, shifted along the road to fit" if moved else "car")
 
 
 def _repeats(road: ProfiledRoad, window_m: float) -> list[tuple[Any, ...]]:

@@ -135,6 +135,6 @@ STUDY = Study(
     "of parts of two cells, smoother than the measured ones, which overstates it. The truth lies between. Moved piece "
     "by piece they are even more alike, as each piece may follow the noise. This was run on the real files.",
     from_folder("LiRA-Map", _DOWNLOAD, run), (Item("LiRA-Map", Word.NOT_REPRODUCIBLE,
-    "Run on the real files, it gives the ceiling that is printed with every other set; no paper prints it."),),
+    "Run on the real files, it gives the ceiling that is shown with every other set; no paper gives it."),),
     source="peacefulotter/LiRA-Map, 2021", data=f"LiRA-Map ({_DOWNLOAD})")
 STUDIES = (STUDY,)

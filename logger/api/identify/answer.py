@@ -170,7 +170,7 @@ def identify(question: IdentifyQuestion) -> Identification:
               for one in given]
     records = _records(drives, question, model.vehicle)
     if question.free is None and (question.road != MEASURED or question.obstacles):
-        raise question.wrong("free", ": expected the parameters to find, as the road was not measured")
+        raise question.wrong("free", ": expected the parameters to fit, as the road was not measured")
     if question.road != MEASURED:
         return _on_unmeasured_roads(model, records, question)
     return _on_measured_roads(model, records, _narrowed(question, drives))
@@ -275,7 +275,7 @@ def _with_unknown_numbers(given: vehicle_file.CarModel, word: str, question: Ide
     named = {one.replace(f"{BOTH}.", f"{axle}.") for one in free for axle in AXLES}
     free += [name for name, one in known.items() if one.words == UNKNOWN and name not in named]
     if not free and question.free is None:
-        raise question.wrong("free", f": expected the parameters to find, as {word} gives all of them exactly (or "
+        raise question.wrong("free", f": expected the parameters to fit, as {word} gives all of them exactly (or "
                                      "write 875 +- 5%, or unknown, for one in the file)")
     return replace(question, free=free)
 
@@ -593,8 +593,8 @@ def common_words(model: DriveModel, common: CommonRoughness) -> Iterator[str]:
     runs = len(model.records)
     if common.share:
         yield (f"These {runs} runs are over one road: they share {common.share:.0%} of the roughness that the profile "
-               f"does not contain. The standard errors count that; they are up to {common.growth:.2f} times those of "
-               "runs over roads of their own.")
+               f"does not contain. The standard errors include that; they are up to {common.growth:.2f} times those "
+               "of runs over different roads.")
     elif may_have_common(model) and common.fit.noise.name != "road":
         yield (f"If these {runs} runs are over the same stretch, they share the error of its profile: true standard "
                f"errors are then up to {np.sqrt(runs):.2f} times those above.")

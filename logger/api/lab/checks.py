@@ -200,8 +200,8 @@ def _other_ways_up(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
     """Which runs are upside down."""
     for k, ((run, _), around) in enumerate(zip(followed.pairs, followed.around, strict=True)):
         if around.is_upside_down and (below := followed.below_at_hand[k]).turned > below.correlation:
-            yield (f"{run.name}: expected {run.facts.main.name} up positive, found them upside down: turned over, they "
-                   f"follow the model (correlation {around.turned:.2f})")
+            yield (f"{run.name}: expected {run.facts.main.name} up positive, found them upside down: with the sign "
+                   f"changed they follow the model (correlation {around.turned:.2f})")
 
 
 def _other_units(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
@@ -249,8 +249,9 @@ def _other_units_on_rig(runs: SimulatedRuns, rig: LikeliestRig | None) -> Iterat
         nearest = min((size for _, _, size in sizes), key=lambda size: abs(log(gain / size)))
         likely = " or ".join(f"{name} in {unit}" for name, unit, size in sizes
                              if abs(size / nearest - 1) < _NEAR and abs(log(gain / nearest)) < log(_APART))
-        yield (f"{run.name}: expected N, m and m/s2, found {main.name} {gain:.3g} times what any rig reads that the "
-               f"vehicle's file allows: " + (f"it looks like {likely}" if likely else "is a column in another unit?"))
+        yield (f"{run.name}: expected N, m and m/s2, found {main.name} {gain:.3g} times the reading of any rig "
+               "that the vehicle's file allows: "
+               + (f"it looks like {likely}" if likely else "is a column in another unit?"))
 
 
 def _other_units_of_signals(runs: SimulatedRuns, predictions: Sequence[Array]) -> Iterator[str]:
@@ -304,7 +305,7 @@ def _another_car(word: str, model: CarModel, runs: SimulatedRuns, predictions: S
                f"model explains next to nothing of it (NRMSE {found.error:.2f}), a model with "
                f"{', '.join(f'{name} {share:+.0%}' for name, share in far)}{more} leaves {found.found_error:.2f}. "
                "Is this the right vehicle file? ridelog identify fits a model's parameters"
-               + ("" if COMPILED else "; effects that are forces were not tried, which takes the lab extra"))
+               + ("" if COMPILED else "; force effects were not tried, as they need the lab extra"))
 
 
 def _advice(run: Run, car: Car, band_hz: tuple[float, float]) -> str:

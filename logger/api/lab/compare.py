@@ -552,7 +552,7 @@ def judgement(found: AddedEffects) -> list[str]:
                            "{} refitted without it, {} with it, noise floor about {}")
     if found.excess > UNEXPLAINED:
         lines.append(f"Something more is missing: in the worst run the residual is {1 + found.excess:.3g} times the "
-                     "sensor's noise. This biases the parameters, maybe by more than their standard errors; add "
+                     "sensor's noise. This biases the parameters, possibly by more than their standard errors; add "
                      "all that ridelog diagnose finds together.")
     for one in found.new:
         at = [parameter.name for parameter in one.effect.parameters if parameter.is_free

@@ -264,8 +264,8 @@ def _on_one_distance(drives: Sequence[tuple[drive_file.Drive, str]]) -> list[tup
         along_m, aside_m = line.passed(*_places(drive))
         near = (aside_m < ASIDE_M) & (along_m > metres[0]) & (along_m < metres[-1])
         if np.ptp(drive.distance_m[near]) < _LEAST_SHARED_M if near.any() else True:
-            raise BadInput(f"{name}: expected a drive over the road of {along.path}, found none of its positions there "
-                           f"for {_LEAST_SHARED_M:g} m")
+            raise BadInput(f"{name}: expected a drive over the road of {along.path}, found that they share less than "
+                           f"{_LEAST_SHARED_M:g} m")
         farther_m = float(np.median((along_m - drive.distance_m)[near]))
         found.append((replace(drive, distance_m=drive.distance_m + farther_m), name))
     return found
@@ -635,7 +635,8 @@ def same_road_summary(found: UnknownRoadDiagnosis) -> list[str]:
     if found.undecided:
         names, them = enumerated([one.name for one in found.undecided], "or"), len(found.undecided) > 1
         lines.append(f"Undecided: {names}. {'They explain' if them else 'It explains'} more than noise would, but less "
-                     "than a tenth of what no road explains, and may only imitate something else that is missing.")
+                     "than a tenth of the residual that no road explains, and may only imitate something else that is "
+                     "missing.")
     elif not lines:
         lines.append("None of the effects that can be tried without a profile is missing.")
     by_step = [f"{error:.3f} with {words.removeprefix('with ')}" for words, error in _same_road_steps(found)]
@@ -644,8 +645,8 @@ def same_road_summary(found: UnknownRoadDiagnosis) -> list[str]:
     if found.unexplained:
         cause = ("Something else is missing, perhaps" if found.exact_places else
                  "Either the GPS distances of these drives drift within seconds, or something else is missing, perhaps")
-        lines.append(f"What no road explains is {1 + found.excess:.2f} times the sensor's noise. {cause} one of the "
-                     "effects that only a measured road can show.")
+        lines.append(f"The residual that no road explains is {1 + found.excess:.2f} times the sensor's noise. {cause} "
+                     "one of the effects that only a measured road can show.")
     return lines
 
 
@@ -661,8 +662,8 @@ def cannot_tell(found: UnknownRoadDiagnosis) -> list[str]:
     lines = [f"Whether {one} and {other} are over one road: where they overlap, their records hardly exceed "
              "the noise." for one, other in found.doubtful]
     if found.absorbed_by_road:
-        lines.append(f"{', '.join(found.absorbed_by_road)}: not tried; on a road that nobody measured, another road "
-                     "would look the same.")
+        lines.append(f"{', '.join(found.absorbed_by_road)}: not tried; without a profile, another road would look "
+                     "the same.")
     lines += lab_words.not_tried(found.untried)
     lines += [f"{name}: detectability {deviations:.1f} ({DETECTABLE_SIGMA:g} needed)."
               for name, deviations in found.hidden.items()]

@@ -252,8 +252,8 @@ class LabLoopQuestion(LabQuestion):
         "folder for the vehicle files and the page", metavar="DIR", read=Path)] = Path("ridelog-lab")
     _: KW_ONLY
     ask: Annotated[Callable[[str], str | None],
-                   "given the name of an effect that was found missing, gives that of the one to be added, or None for "
-                   "none; without it all that is missing is added"] = str
+                   "takes the name of an effect found missing, and returns the name of the one to add, or None to add "
+                   "none; without it everything missing is added"] = str
     candidates: shared_fields.Candidates = None
     effect_files: shared_fields.EffectFiles = ()
     learns: Annotated[bool, "whether a law is learnt at all"] = True

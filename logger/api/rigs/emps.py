@@ -58,7 +58,7 @@ def run(folder: Path, effort: Workload) -> Result:
                   data_sets.pictures("Force of the axis", made, "N", _SHOWN_S, skip), (
         Statement("dry_friction is named first (1: yes)", "Coulomb friction",
                   float(found.diagnosis.verdict[:1] == (EFFECT,)), 1, 1, of=("EMPS friction",)),
-        Statement("error of the force over the force", "Coulomb friction", better, 0.0, linear / 2,
+        Statement("NRMSE of the force", "Coulomb friction", better, 0.0, linear / 2,
                   of=("EMPS friction",)),
         *(Value(name, printed, value, _NEAR * printed, of=("EMPS numbers",))
           for (name, printed), value in zip(PUBLISHED, ours, strict=True))))

@@ -77,7 +77,7 @@ def run(folder: Path, effort: Workload) -> Result:
 
 def _verdict(found: data_sets.Improved, linear: list[float], better: list[float]) -> str:
     names = " and ".join(found.diagnosis.verdict) or "nothing"
-    return (f"diagnose names {names}. On the multisine that no fit has seen the simulated output is off by "
+    return (f"diagnose names {names}. On the multisine, which no fit used, the simulated output is off by "
             f"{better[0]:.2f} mV, {linear[0]:.2f} mV as a linear rig; on the arrow by {better[1]:.2f} mV instead of "
             f"{linear[1]:.2f} mV. The model has one parameter more than a linear one and holds beyond the amplitudes "
             "of the fit, where a black box has to extrapolate.")

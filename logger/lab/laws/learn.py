@@ -126,7 +126,7 @@ def _beyond(posterior: Posterior, one: Chosen) -> str:
     bands = [each for run in posterior.bands for each in run.each]
     low_hz, high_hz = min(each.edges_hz[0] for each in bands), max(each.edges_hz[-1] for each in bands)
     if frequency_hz is not None and not low_hz < frequency_hz < high_hz:
-        return (f"its frequency, {frequency_hz:.3g} Hz, is outside of {low_hz:.2g} to {high_hz:.3g} Hz, in which the "
+        return (f"its frequency, {frequency_hz:.3g} Hz, is outside {low_hz:.2g} to {high_hz:.3g} Hz, in which the "
                 "runs are compared")
     return "one of its parameters ended at a bound" if is_outside_data(posterior, one) else ""
 

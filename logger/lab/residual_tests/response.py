@@ -61,7 +61,7 @@ class GainTest(ResidualTest):
     def sentence(self, found: ResidualTestResult) -> str:
         """The gain with its standard error."""
         return (f"The part of the measurement that follows the model is {found.value:.3g} ± {found.standard_error:.1g} "
-                "times as large.")
+                "times as large as the model.")
 
 
 class ProportionTest(ResidualTest):

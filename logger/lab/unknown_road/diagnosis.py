@@ -375,7 +375,7 @@ def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequen
                 if isinstance(effect, ForceEffect) and off <= 1e-3:  # a table of a response is right to that
                     why = "only a measured road shows motion that is not proportional to the road"
             except ValueError:
-                why = "what cannot be linearised takes a measured road"
+                why = "it cannot be linearised, so it needs a measured road"
         if why is not None:
             found[name] = why
     return found

@@ -99,7 +99,7 @@ def response_of(car: Car, rate_hz: float) -> Complex:
     Left and right wheels are on the same road. ValueError for a car whose laws are not linear.
     """
     if not is_linear(car):
-        raise ValueError("expected a car that answers in proportion to the road")
+        raise ValueError("expected a linear car")
     linear = known_car(car)
     assert isinstance(linear, LinearCar)
     return _by_axle(linear, rate_hz)
