@@ -23,7 +23,7 @@ _WIDTH, _NARROWEST = 118, 24
 
 @dataclass(frozen=True, kw_only=True)
 class StudyQuestion(LongQuestion):
-    """Reproduce a table or a figure of the reference dissertation, or of other papers, with its printed values.
+    """Reproduce a table or a figure of the reference dissertation, or of other papers, beside its published values.
 
       ridelog study --list
       ridelog study table-4-4

@@ -16,7 +16,7 @@ _FIRM = "\u00a0"  # a space at which no line breaks
 _NOT_RUN = "not run"
 _FAILED = "failed"
 _STYLE = "td:first-child{white-space:normal;min-width:9em}figure+.hint{margin-bottom:2em}"
-_UNBROKEN = ("of", "word", "true for")  # Columns of short words, which break between items only
+_UNBROKEN = ("of", "verdict", "true for")  # Columns of short words, which break between items only
 _INDEX_STYLE = _STYLE + (
     "th,td{vertical-align:top}td:nth-child(3){font-weight:600}td:nth-child(3),td:nth-child(5){white-space:nowrap}"
     "@media screen and (max-width:640px){table,tbody,tr,td{display:block;text-align:left}tr:first-child{display:none}"
@@ -48,12 +48,12 @@ def _items(study: Study, result: Result) -> doc.Html:
         checks = max(len(study.checks_of(name, result)) for name in names)
         counted = f" ({checks} check{'s' * (checks > 1)}{' of each' * (len(names) > 1)})" if checks else ""
         lines.append(f"{_joined(names)}: {word_of(study.checks_of(item.name, result))}. {item.because}{counted}")
-    return doc.section("Ours against the published values", doc.bullets(lines))
+    return doc.section("ridelog against the published values", doc.bullets(lines))
 
 
 def _picture(picture: Picture) -> doc.Html:
     drawn = chart(picture.chart)
-    return doc.html("{}{}", drawn, doc.hint(f"Printed: {picture.printed}.")) if picture.printed else drawn
+    return doc.html("{}{}", drawn, doc.hint(f"Published: {picture.printed}.")) if picture.printed else drawn
 
 
 def _joined(names: Sequence[str]) -> str:
@@ -74,10 +74,10 @@ def index(known: Sequence[Study], carried: Mapping[str, Carried], share: float =
     parts = [[one for one in known if (one.source == DISSERTATION) is its_own] for its_own in (True, False)]
     titles = (f"Contents: {DISSERTATION}", "Contents: other sources")
     return doc.document("Studies", [
-        doc.heading("Studies: printed results, recomputed",
-                    "Each printed item has a verdict on how ours compares with it."),
+        doc.heading("Studies: published results, recomputed",
+                    "Each published item has a verdict on how ridelog compares with it."),
         doc.paragraphs(_quick(share)), doc.tiles(tile for tile in counts if tile[1] != "0"),
-        *(doc.section(title, doc.grid(("printed", "study", "word", "because", "time"), [
+        *(doc.section(title, doc.grid(("published", "study", "verdict", "because", "time"), [
             row for one in part for row in _rows(one, carried.get(one.called))], range(4)))
           for title, part in zip(titles, parts, strict=True) if part)],
         style=_INDEX_STYLE)

@@ -76,8 +76,8 @@ class Value:
     @property
     def wrong(self) -> str:
         """The value as it stands where it does not hold."""
-        return (f"{self.name} ({self.ours:.5g}, printed {self.printed:.5g}, tolerance {self.tolerance:.2g}, expected: "
-                f"{self.word})")
+        return (f"{self.name} ({self.ours:.5g}, published {self.printed:.5g}, tolerance {self.tolerance:.2g}, "
+                f"expected: {self.word})")
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,8 @@ class Statement:
     @property
     def wrong(self) -> str:
         """The statement as it stands where it does not hold."""
-        return f"{self.name} ({self.ours:.5g}, printed {self.printed!r}, true for {self.bounds}, expected: {self.word})"
+        return (f"{self.name} ({self.ours:.5g}, published {self.printed!r}, true for {self.bounds}, "
+                f"expected: {self.word})")
 
 
 Check = Value | Statement
@@ -235,14 +236,14 @@ class Result:
     def all_tables(self) -> tuple[Table, ...]:
         """The checks first, where there are any: numbers, statements, and the print beside itself."""
         numbers = [one for one in self.values if isinstance(one, Value)]
-        tables = [_of_checks(title, ("value", "printed .6g", f"{ours} .6g", "difference +.3g", "tolerance .3g"), some,
+        tables = [_of_checks(title, ("value", "published .6g", f"{ours} .6g", "difference +.3g", "tolerance .3g"), some,
                              lambda one: (one.name, one.printed, one.ours, one.difference, one.tolerance))
-                  for title, ours, of_print in (("Printed and ours", "ours", False),
+                  for title, ours, of_print in (("Published values and ridelog's", "ridelog", False),
                                                 ("The publication against its own figures", "as published", True))
                   if (some := [one for one in numbers if one.of_print is of_print])]
         if statements := [one for one in self.values if isinstance(one, Statement)]:
             tables.insert(min(1, len(tables)), _of_checks(
-                "Printed in words, and ours", ("printed", "figure", "ours", "true for"), statements,
+                "Published in words, and ridelog's figures", ("published", "figure", "ridelog", "true for"), statements,
                 lambda one: (one.printed, one.name, one.ours, one.bounds)))
         return (*tables, *self.tables)
 
@@ -255,7 +256,7 @@ def _of_checks(title: str, heads: Sequence[str], checks: Sequence[Check], cells:
     for one in checks:
         first, *others = cells(one)
         rows.append((first, *[", ".join(one.of)] * said, *others, _stands(one)))
-    return Table(title, (heads[0], *["of"] * said, *heads[1:], "word"), tuple(rows))
+    return Table(title, (heads[0], *["of"] * said, *heads[1:], "verdict"), tuple(rows))
 
 
 def _stands(check: Check) -> str:

@@ -60,7 +60,7 @@ def test_a_study_runs_and_is_whole(name: str) -> None:
                 assert not isinstance(cell, float) or math.isfinite(cell)
     headings = [head for table in result.all_tables for head in table.heads]
     titles = [table.title for table in result.all_tables]
-    assert any("printed" in words.lower() for words in headings + titles), "a study without the print beside it"
+    assert any("published" in words.lower() for words in headings + titles), "a study without the print beside it"
     assert len(result.verdict) > 80
     assert result.verdict.endswith(".")
     assert study.how.endswith(".")
@@ -138,7 +138,7 @@ def test_a_study_that_is_not_as_it_states_says_so() -> None:
     good, bad = (Value(name, 1.2, ours, 0.05) for name, ours in (("body [Hz]", 1.21), ("wheel [Hz]", 1.3)))
     assert not study.differs(Result((), "", values=(good,)))
     reported = study.differs(Result((), "", values=(good, bad)))
-    assert "wheel [Hz] (1.3, printed 1.2" in reported
+    assert "wheel [Hz] (1.3, published 1.2" in reported
     assert "body" not in reported
 
 

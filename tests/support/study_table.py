@@ -12,7 +12,7 @@ TITLES = {"dissertation": "The dissertation, item by item", "field": "Other pape
 
 def page() -> str:
     """A table for each shelf: a row for each printed item with its word and its study."""
-    parts = ["# Printed items and what came of them", "",
+    parts = ["# Published items and what came of them", "",
              "Made by `python -m tests.support.reference` from the studies themselves. [Studies](../studies.md) says "
              "what the four words mean."]
     for shelf in SHELVES:
@@ -20,7 +20,7 @@ def page() -> str:
                        for item in study.items), key=lambda row: row[0])
         if rows:
             parts += ["", f"## {TITLES[shelf]}", "",
-                      "| printed | study | word | because |", "| --- | --- | --- | --- |",
+                      "| published | study | verdict | because |", "| --- | --- | --- | --- |",
                       *(f"| {item.name} | `{study.called}` | {item.word} | {item.because} |"
                         for _, item, study in rows)]
     return "\n".join(parts) + "\n"

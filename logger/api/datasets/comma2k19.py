@@ -41,7 +41,8 @@ def run(folder: Path, effort: Workload) -> Result:
              "is right.")
     speed = _speeds(log, recording)
     if speed is not None:
-        tables.append(Table("The receiver's speed against the car's", ("figure", "read before .3g", "ours .3g"), speed))
+        tables.append(Table("The receiver's speed against the car's",
+                            ("figure", "read before .3g", "ridelog .3g"), speed))
     return Result(tuple(tables), words, (Picture(_map(drives)),))
 
 

@@ -86,7 +86,7 @@ def _beside(found: data_sets.Improved, ours: Sequence[float]) -> Table:
               friction.standard_errors.get(FRICTION) if friction else None)
     rows = tuple((name, printed, value, error, 100 * (value / printed - 1))
                  for (name, printed), value, error in zip(PUBLISHED, ours, errors, strict=True))
-    return Table("Numbers of the axis", ("number", "published .5g", "ours .5g", "its standard error .2g",
+    return Table("Numbers of the axis", ("number", "published .5g", "ridelog .5g", "its standard error .2g",
                                          "apart [%] +.1f"), rows)
 
 

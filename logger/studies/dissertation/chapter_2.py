@@ -67,7 +67,7 @@ def _t2_2(effort: Workload) -> Result:
                                         0.01, Word.MISPRINT)])
     table = Table(f"Classes, and {roads} generated roads of each geometric mean", (
         "class", "Gd(n0) found in the roads [cm3]", "waviness found .3f", "correctly classified [%] .0f"), tuple(rows))
-    verdict = ("All limits and means agree. The printed unit, 1e-6 m2 (cycle/m), is a misprint: a displacement "
+    verdict = ("All limits and means agree. The published unit, 1e-6 m2 (cycle/m), is a misprint: a displacement "
                "spectrum is in m2 per cycle/m, or m3, and 1e-6 m3 is 1 cm3. For roads generated at each mean, ridelog "
                "finds the degree of roughness, a waviness near 2 and the class. The exponent of the metre is the "
                "power of 2 by which a road's spectrum grows when all its lengths are doubled.")
@@ -101,7 +101,7 @@ T2_2 = Study("table_2_2", "The classes of ISO 8608, and roads of each", "Table 2
               "The limits are those at which ridelog changes the class of a road; roads of 1 km are generated at each "
               "class's geometric mean and classified from their elevations alone.", _t2_2,
               items=(Item("Table 2.2", Word.MISPRINT,
-                          "All limits agree; the printed unit should be 1e-6 m2 per cycle/m, which is cm3."),
+                          "All limits agree; the published unit should be 1e-6 m2 per cycle/m, which is cm3."),
                      Item("Fig 2.5", Word.AGREES, "The plotted limits are those of the table, at waviness 2.")))
 
 
@@ -147,10 +147,10 @@ def _t2_3(effort: Workload) -> Result:
 
 T2_3 = Study("table_2_3", "IRI of kinds of road, and how they ride", "Table 2.3, section 2.2.2.3",
               "ridelog describes each IRI from 0 to 25 m/km in steps of 0.001; the values at which the description "
-              "changes are compared with the printed ones.", _t2_3,
+              "changes are compared with the published ones.", _t2_3,
               items=(*alike(("Table 2.3", "Fig 2.16"), Word.AGREES,
-                            "Each kind of road begins and ends at the printed IRI."),
-                     Item("Table 2.4", Word.AGREES, "The description of the ride changes at the printed marks."),
+                            "Each kind of road begins and ends at the published IRI."),
+                     Item("Table 2.4", Word.AGREES, "The description of the ride changes at the published marks."),
                      Item("2.2.2.3 targets", Word.AGREES, "Good and fair roads end at the targets of 2006 and 2002.")))
 
 
@@ -192,12 +192,12 @@ def _f2_7(effort: Workload) -> Result:
         "smallest ratio of the spectra in any band, class D over class B", "shifted upward at all wave numbers",
         float((levels[1] / levels[0]).min()), least=1.0)])
     table = Table("Two roads, classified from their elevations", (
-        "printed class", "our class", "its mean Gd(n0) [cm3] .0f", "Gd(n0) found [cm3] .1f", "waviness found .3f",
+        "published class", "class found", "its mean Gd(n0) [cm3] .0f", "Gd(n0) found [cm3] .1f", "waviness found .3f",
         "scatter of the raw spectrum [dB] .1f", "of the smoothed [dB] .2f"), tuple(rows))
     verdict = ("As the text describes: the rough road's spectrum lies above the smooth one's at all wave numbers, and "
                "both fall towards short waves. The raw spectra are ragged; smoothing over the bands of Eq 2.4 to 2.6 "
                f"reduces their scatter from {scatters[0][0]:.1f} to {scatters[0][1]:.1f} dB. The text says that the "
-               "bands are listed in ISO 2631-1; they are in ISO 8608. The printed phases are not known, so only the "
+               "bands are listed in ISO 2631-1; they are in ISO 8608. The published phases are not known, so only the "
                "statistics of the roads can agree.")
     pictures = (Picture(Curves("The first 100 m of a smooth and a rough road (Fig 2.6, 2.8)", "distance [m]",
                                "elevation [mm]", tuple(roads)),
@@ -242,7 +242,7 @@ def _t2_7(effort: Workload) -> Result:
             else:
                 rows.append((weighting.name, name, "infinite" if said else "none",
                              "without effect" if said is None else "infinite" if mine == inf else f"{mine:g}"))
-    absent = Table("Sections that a weighting lacks", ("weighting", "parameter", "printed", "ours"), tuple(rows))
+    absent = Table("Sections that a weighting lacks", ("weighting", "parameter", "published", "ridelog"), tuple(rows))
     verdict = (f"All {len(values)} finite parameters agree. Sections that the tables omit, by an infinite frequency, "
                "are omitted here too. Study fig-2-18 evaluates the formula with them.")
     return Result((absent,), verdict, (), tuple(values))
@@ -265,7 +265,7 @@ def _f2_13(effort: Workload) -> Result:
     body_cpm, wheel_cpm = undamped_frequencies_hz(quarter_car(GOLDEN_CAR)) / STANDARD_SPEED_MPS
     nearest = [float(wave_number[min(peaks, key=lambda peak: abs(np.log(wave_number[peak] / of)))])
                for of in (wheel_cpm, body_cpm)]
-    verdict = ("Both peaks lie within 4 % of the printed wave numbers, which is as closely as a broad peak can be "
+    verdict = ("Both peaks lie within 4 % of the published wave numbers, which is as closely as a broad peak can be "
                "read off a figure. The text swaps their meaning: at 0.065 cycle/m the body bounces, at 0.42 the wheel "
                "hops. At 80 km/h these are 1.44 and 9.33 Hz.")
     picture = Picture(Curves("Gain of the IRI's car at 80 km/h, slope of the suspension per slope of the road",
@@ -310,18 +310,18 @@ def _f2_18(effort: Workload) -> Result:
         for by_eq, ours in [(_by_printed_equations(f_hz, parameters), float(abs(weighting.response(f_hz))))]])
     # The right side of Eq 2.16 has f5 and Q5 above and below the line, so it is Q6 / Q5 at all frequencies.
     as_printed = replace(WK, f5_hz=inf, q5=1.0, f6_hz=inf, q6=1.0, gain=WK.q6 / WK.q5)
-    misprint = about("Eq 2.16", [Value(f"wk at {at_hz:g} Hz, by Eq 2.16 as printed", float(abs(as_printed.response(
+    misprint = about("Eq 2.16", [Value(f"wk at {at_hz:g} Hz, by Eq 2.16 as published", float(abs(as_printed.response(
         at_hz))), float(abs(WK.response(at_hz))), 0.1, Word.MISPRINT)])
     f_hz = np.geomspace(0.02, 400.0, effort.count(400, 60))
     levels = {weighting.name: 20 * np.log10(np.abs(weighting.response(f_hz)))
               for weighting, _ in effort.each(PRINTED_T2_7)}
     rows = tuple((name, float(f_hz[level.argmax()]), float(level.max()), float(f_hz[level > level.max() - 3].min()),
                   float(f_hz[level > level.max() - 3].max())) for name, level in levels.items())
-    table = Table("The curves (printed as pictures only)", (
+    table = Table("The curves (published as pictures only)", (
         "weighting", "largest at [Hz] .3g", "there [dB] +.2f", "within 3 dB of it from [Hz] .3g", "to [Hz] .3g"), rows)
-    verdict = ("The curves agree with the standard's factors to the printed digit. Eq 2.16 as printed does not: its "
-               "denominator has f5 and Q5, like its numerator, so it is 1 at all frequencies, and Wk at 1 Hz would be "
-               "twice as large. The denominator needs f6 and Q6. Of the figures the text says only that they plot "
+    verdict = ("The curves agree with the standard's factors to the published digit. Eq 2.16 as published does not: "
+               "its denominator has f5 and Q5, like its numerator, so it is 1 at all frequencies, and Wk at 1 Hz would "
+               "be twice as large. The denominator needs f6 and Q6. Of the figures the text says only that they plot "
                "amplitude against frequency. Here Wk has a plateau of half its maximum near 1 Hz and its maximum at 6 "
                "Hz; Wd has its maximum at 1 Hz, Wf at 0.17 Hz.")
     pictures = tuple(Picture(Curves(title, "frequency [Hz]", "factor [dB]", tuple(
@@ -352,7 +352,7 @@ def _second_order(f_hz: float, corner_hz: float, q: float) -> float:
 F2_18 = Study("fig_2_18", "Curves of the six frequency weightings", "Fig 2.18, section 2.3.4.1",
               "The magnitude of the formulas of ISO 2631-1 Annex A, which ridelog applies to whole records.", _f2_18,
               items=(Item("Fig 2.18", Word.AGREES,
-                          "The principal weightings agree with the standard's factors to the printed digit."),
+                          "The principal weightings agree with the standard's factors to the published digit."),
                      Item("Fig 2.19", Word.AGREES,
                           "The additional weightings are those of Eq 2.13 to 2.15 with the parameters of Table 2.8."),
                      Item("Eq 2.16", Word.MISPRINT,
@@ -366,7 +366,7 @@ def _f2_20(effort: Workload) -> Result:
     zones = [(hours, caution_zone(hours, 2), caution_zone(hours, 4)) for hours in effort.each(hours_shown)]
     table = Table("The zone, weighted r.m.s.", (
         "hours a day .3g", "n = 2, from [m/s2] .3f", "to [m/s2] .3f", "n = 4, from [m/s2] .3f", "to [m/s2] .3f",
-        "printed"), tuple(
+        "published"), tuple(
         (hours, two.lower, two.upper, four.lower, four.upper,
          "shaded" if printed_shaded_hours[0] <= hours <= printed_shaded_hours[1] else "not shaded")
         for hours, two, four in zones))
@@ -381,7 +381,7 @@ def _f2_20(effort: Workload) -> Result:
     verdict = ("The text swaps the doses: 17 belongs to the upper line, 8.5 to the lower. The lines of constant a^2 t "
                f"and constant a^4 t cross at {crossing:.1f} hours and lie within "
                f"{100 * np.abs(np.log(apart[(fine >= 4) & (fine <= 8)])).max():.0f} % of each other from 4 to 8 hours, "
-               "which is where the printed figure is shaded; at 10 minutes those of n = 2 are "
+               "which is where the published figure is shaded; at 10 minutes those of n = 2 are "
                f"{apart[np.searchsorted(fine, 1 / 6)]:.1f} times as high.")
     hours = np.geomspace(1 / 60, 24, 60)
     lines = tuple(Line(f"n = {exponent}, {bound}", hours, np.array([

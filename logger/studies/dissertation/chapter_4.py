@@ -69,18 +69,18 @@ from logger.vehicle.models import GOLDEN_CAR, quarter_car, structure_of
 from logger.vehicle.modes import modes, undamped_frequencies_hz
 from logger.vehicle.structure import Structure
 
-COLUMNS = ("motion", "printed [Hz] .1f", "undamped, coupled [Hz] .3f", "springs and tires in series [Hz] .3f",
-           "damped, coupled [Hz] .3f", "printed damping .2f", "in series, damping .3f", "coupled, damping .3f")
+COLUMNS = ("motion", "published [Hz] .1f", "undamped, coupled [Hz] .3f", "springs and tires in series [Hz] .3f",
+           "damped, coupled [Hz] .3f", "published damping .2f", "in series, damping .3f", "coupled, damping .3f")
 
 
 def _t4_1(effort: Workload) -> Result:
     printed_hz = (1.2, 11.0)
     car = quarter_car(GOLDEN_CAR)
     (rows,) = (quoted(car, ("body", "wheel"), printed_hz, (0.40, None)) for _ in effort.each(range(1)))
-    verdict = ("The printed frequencies are those of the coupled car without its damper, to the last digit. The "
-               "printed damping ratio is nearly that of a body on spring and tire in series, with the damper parallel "
-               "to both: 0.395, printed 0.39. In the coupled car, whose wheel moves too, the damping ratio of the "
-               "body is a sixth smaller.")
+    verdict = ("The published frequencies are those of the coupled car without its damper, to the last digit. The "
+               "published damping ratio is nearly that of a body on spring and tire in series, with the damper "
+               "parallel to both: 0.395, published 0.39. In the coupled car, whose wheel moves too, the damping ratio "
+               "of the body is a sixth smaller.")
     return Result((Table("Vibrations of the Golden Car", COLUMNS, rows),), verdict, (), quoted_values(rows))
 
 
@@ -116,7 +116,7 @@ def quoted(car: Structure, names: tuple[str, ...], printed_hz: tuple[float | Non
 T4_1 = Study("table_4_1", "Natural frequencies of the quarter car (the Golden Car)", "Table 4.1, section 4.3.3",
               "The eigenvalues of Table 4.1's car.", _t4_1,
               items=(Item("Table 4.1", Word.AGREES,
-                          "The frequencies agree to the last printed digit, the damping ratio within 0.005."),))
+                          "The frequencies agree to the last published digit, the damping ratio within 0.005."),))
 
 
 def _t4_2(effort: Workload) -> Result:
@@ -159,18 +159,18 @@ def _t4_3(effort: Workload) -> Result:
     rows = tuple((name, gd, limit, float(one), float(spread), iri_of_road(gd, length_m).value)
                  for (name, gd, limit), one, spread in zip(PRINTED_T4_3, mean, std, strict=True))
     table = Table("Upper limits of the classes", (
-        "class", "printed Gd(n0) [cm3] .0f", "printed IRI [m/km] .2f",
-        f"ours, mean of {roads} roads of 1 km [m/km] .2f", "standard deviation between roads [m/km] .2f",
-        "ours, computed [m/km] .3f"), rows)
+        "class", "published Gd(n0) [cm3] .0f", "published IRI [m/km] .2f",
+        f"ridelog, mean of {roads} roads of 1 km [m/km] .2f", "standard deviation between roads [m/km] .2f",
+        "ridelog, computed [m/km] .3f"), rows)
     power = float(np.polyfit(np.log(gds), np.log(mean), 1)[0])
     factor = float((mean / np.sqrt(gds)).mean())
-    verdict = (f"The relation agrees: {factor:.4f} beside the printed {iso8608.IRI_PER_ROOT_GD}, and the power is one "
-               "half because the IRI's car is linear. The rest is the choice of roads: computed for waves of 0.011 to "
-               "2.83 cycle/m, the factor is 0.543. The relation holds only for a waviness of 2 and long roads; roads "
-               "of 100 m scatter by 10 % about it.")
+    verdict = (f"The relation agrees: {factor:.4f} beside the published {iso8608.IRI_PER_ROOT_GD}, and the power is "
+               "one half because the IRI's car is linear. The rest is the choice of roads: computed for waves of 0.011 "
+               "to 2.83 cycle/m, the factor is 0.543. The relation holds only for a waviness of 2 and long roads; "
+               "roads of 100 m scatter by 10 % about it.")
     picture = Picture(Curves("IRI of roads by degree of roughness", "root of Gd(n0) [cm^1.5]", "IRI [m/km]", (
         Line("Eq 4.39", np.sqrt(gds), iso8608.IRI_PER_ROOT_GD * np.sqrt(gds)),
-        Line("ours", np.sqrt(gds), mean, dots=True))),
+        Line("ridelog", np.sqrt(gds), mean, dots=True))),
         "no figure, a table of the upper limits of classes A to D")
     # Sixty roads leave an average in doubt by half a per cent, a few by more; the choice of waves makes one per cent.
     within = 0.01 + 3 * iri_of_road(1.0, length_m).std / iri_of_road(1.0, length_m).value / roads**0.5
@@ -205,7 +205,7 @@ def _f4_3(effort: Workload) -> Result:
         quality = dict(printed).get(gd)
         rows.append((gd, iso8608.road_class(gd), quality, expected, float(rms_mm.mean()), float(rms_mm.std())))
         values += about(_FIGURES.get(gd, ("Fig 4.5",)), [
-            Value(f"r.m.s. elevation at {gd:.0f} cm3, of Eq 4.2 and ours [mm]", expected, float(rms_mm.mean()),
+            Value(f"r.m.s. elevation at {gd:.0f} cm3, of Eq 4.2 and ridelog [mm]", expected, float(rms_mm.mean()),
                   tolerance * expected)])
     values += about("Fig 4.4", [Statement("Gd of the road [cm3]", "poor, as a road of class D in 4.3.4",
                                           printed[1][0],
@@ -213,18 +213,18 @@ def _f4_3(effort: Workload) -> Result:
     # Without 2 pi every wave is 2 pi times as long, and there are 2 pi times as many in a step of wave number.
     asked = printed[1][0]
     values += about("Eq 4.1", [Value(
-        f"Gd(n0) of a road made for {asked:.0f} cm3, by Eq 4.1 as printed [cm3]", asked / (2 * np.pi),
+        f"Gd(n0) of a road made for {asked:.0f} cm3, by Eq 4.1 as published [cm3]", asked / (2 * np.pi),
         classify(iso8608.generate(asked, length_m, spacing_m, 0), spacing_m).gd_n0_cm3, asked / 4,
         Word.MISPRINT)])
     table = Table(f"R.m.s. elevation of {roads} roads of 1 km", (
-        "Gd(n0) [cm3] .0f", "class", "printed quality", "sum of Eq 4.2's amplitudes [mm] .2f", "ours, mean [mm] .2f",
-        "standard deviation between roads [mm] .2f"), tuple(rows))
+        "Gd(n0) [cm3] .0f", "class", "published quality", "sum of Eq 4.2's amplitudes [mm] .2f",
+        "ridelog, mean [mm] .2f", "standard deviation between roads [mm] .2f"), tuple(rows))
     verdict = ("The r.m.s. elevation of generated roads is that of Eq 4.2's amplitudes, in proportion to the square "
                "root of the degree of roughness. Of Fig 4.5 the text says that its means are those of earlier work "
                "and that its scatter is large; here roads of 1 km with all waves of Eq 4.2 scatter by 2 %. A road of "
                "256 cm3 is of class C, which the text calls poor here; in 4.3.4 it calls class D poor. Its ISO 8606 "
                "is ISO 8608. The argument of Eq 4.1 lacks 2 pi (Appendix A has it), its phases are uniform, not "
-               "normal, and N waves at equal steps repeat after one over the step. Ours chooses the step for the "
+               "normal, and N waves at equal steps repeat after one over the step. ridelog chooses the step for the "
                "road's length, so that nothing repeats.")
     place = np.arange(0, 200.0, 0.5)
     shown = tuple(Line(f"{gd:.0f} cm3, {quality}", place, 1000 * iso8608.generate(gd, 200.0, 0.5, 0)[: len(place)])
@@ -234,8 +234,9 @@ def _f4_3(effort: Workload) -> Result:
     pictures = (Picture(Curves("Two roads (Fig 4.3, 4.4)", "distance [m]", "elevation [mm]", shown),
                         "two figures of generated profiles, 16 cm3 and 256 cm3"),
                 Picture(Curves("R.m.s. elevation and its scatter (Fig 4.5)", "Gd(n0) [cm3]", "r.m.s. elevation [mm]", (
-                    Line("ours", gds, means, stds), Line("Eq 4.2", gds, np.array([1000 * _rms_m(gd) for gd in gd_cm3]),
-                                                         dots=True)), log_x=True, log_y=True),
+                    Line("ridelog", gds, means, stds),
+                    Line("Eq 4.2", gds, np.array([1000 * _rms_m(gd) for gd in gd_cm3]), dots=True)),
+                    log_x=True, log_y=True),
                     "r.m.s. elevations of generated profiles from 1 to 1024 cm3, their means near those of Da Silva "
                     "(2004), with a large scatter"))
     return Result((table,), verdict, pictures, tuple(values))
@@ -248,8 +249,8 @@ def _rms_m(gd_n0_cm3: float) -> float:
 
 
 F4_3 = Study("fig_4_3", "Generated roads and their r.m.s. elevation", "Fig 4.3, section 4.2.2",
-              "Random roads of 1 km; the printed comparison with a figure of Da Silva (2004) has no numbers, so ours "
-              "are compared with the sum of the amplitudes of Eq 4.2, worked out by hand.", _f4_3,
+              "Random roads of 1 km; the published comparison with a figure of Da Silva (2004) has no numbers, so "
+              "those of ridelog are compared with the sum of the amplitudes of Eq 4.2, worked out by hand.", _f4_3,
               items=(Item("Fig 4.3", Word.AGREES,
                           "A generated road of 16 cm3 has the r.m.s. elevation of Eq 4.2 and is of class A."),
                      Item("Fig 4.4", Word.MISPRINT, "A road of 256 cm3 is of class C; 4.3.4 calls class D poor."),
@@ -277,14 +278,14 @@ def _f4_16(effort: Workload) -> Result:
         Value("c of IRI = c Gd^b", iso8608.IRI_PER_ROOT_GD, factor, 0.01 + 3 * factor * factor_std),
         Value("b of IRI = c Gd^b", printed_power, power, 3 * power_std)])
     table = Table(f"Power laws through {roads} roads each", ("set", "c .4f", "b .4f"),
-                  (*((f"ours, {number + 1}", one[1], one[0]) for number, one in enumerate(fits)),
-                   ("ours, all", factor, power), ("printed, Eq 4.39", iso8608.IRI_PER_ROOT_GD, printed_power),
-                   ("ours, computed", iri_of_road(1.0, length_m).value, 0.5)))
+                  (*((f"ridelog, {number + 1}", one[1], one[0]) for number, one in enumerate(fits)),
+                   ("ridelog, all", factor, power), ("published, Eq 4.39", iso8608.IRI_PER_ROOT_GD, printed_power),
+                   ("ridelog, computed", iri_of_road(1.0, length_m).value, 0.5)))
     verdict = (f"Four sets of {roads} roads scatter about a power law, {factor:.3f} Gd^{power:.3f} here beside 0.5386 "
-               "Gd^0.5, which is a straight line on logarithmic axes as printed. The tolerance is three standard "
-               "errors of the regression (the length of the printed roads is not given; ours have 500 m and differ by "
-               f"{100 * spread:.0f} % from road to road), and 0.01 for the choice of waves: computed over 0.011 to "
-               "2.83 cycle/m the factor is 0.543.")
+               "Gd^0.5, which is a straight line on logarithmic axes as published. The tolerance is three standard "
+               "errors of the regression (the length of the published roads is not given; those here have 500 m and "
+               f"differ by {100 * spread:.0f} % from road to road), and 0.01 for the choice of waves: computed over "
+               "0.011 to 2.83 cycle/m the factor is 0.543.")
     dots = tuple(Line(f"set {number + 1}", gd, one, dots=True) for number, one in enumerate(found))
     law = Line("Eq 4.39", gd, iso8608.IRI_PER_ROOT_GD * gd**printed_power)
     pictures = tuple(Picture(Curves(title, "Gd(n0) [cm3]", "IRI [m/km]", (*dots, law), log_x=logarithmic,
@@ -322,10 +323,10 @@ def _f4_18(effort: Workload) -> Result:
     values: tuple[Check, ...] = (*(Value(f"set {number + 1}, IRI found per IRI wanted", 1.0, slope, 0.01 + 3 * chance)
                 for number, slope in enumerate(slopes)),
               Statement("correlation, the smaller of both sets", "highly linear", min(alike_sets), least=0.95))
-    table = Table("IRI of generated roads", ("printed: wanted [m/km] .0f", "set 1 [m/km] .2f", "set 2 [m/km] .2f"),
+    table = Table("IRI of generated roads", ("published: wanted [m/km] .0f", "set 1 [m/km] .2f", "set 2 [m/km] .2f"),
                   tuple((one, *pair) for one, pair in zip(wanted.tolist(), found.T.tolist(), strict=True)))
     spread = relative_spread(length_m)
-    verdict = (f"As printed, highly linear: correlation {min(alike_sets):.3f} and {max(alike_sets):.3f}, slopes "
+    verdict = (f"As published, highly linear: correlation {min(alike_sets):.3f} and {max(alike_sets):.3f}, slopes "
                f"{slopes[0]:.3f} and {slopes[1]:.3f}. A road of 500 m generated for an IRI has that IRI within "
                f"{100 * spread:.0f} % r.m.s., which is why the source shows two sets; the tolerance is three standard "
                "errors of the slope, and 1 % for Eq 4.40. The exact IRI of ASTM E1926, which agrees with the "
@@ -384,12 +385,12 @@ def _t4_4(effort: Workload) -> Result:
         "truth within two standard errors [%] .0f"),
         tuple(chain.from_iterable(_scatter(words, name, draws) for name, words in NAMES.items())))
     verdict = (
-        "From every start ours ends at the same estimate. The printed errors for one record differ by up to 2.4 %: "
-        "the source's search stopped early. The error that remains in ours comes from the road of IRI 5 m/km, which "
+        "From every start ridelog ends at the same estimate. The published errors for one record differ by up to 2.4 "
+        "%: the source's search stopped early. The error that remains comes from the road of IRI 5 m/km, which "
         "the fit does not know, and its standard error says so. The last table repeats this on other roads: the "
-        "source's noise model treats the samples as independent, so its standard errors are too small; ours models "
+        "source's noise model treats the samples as independent, so its standard errors are too small; ridelog models "
         "how a road shakes a car. The source does not give the speed, bump or road of these tables, so only the size "
-        "of the errors can be compared; the spread between starts depends on the search alone. The printed "
+        "of the errors can be compared; the spread between starts depends on the search alone. The published "
         "stiffnesses of 20,000 to 25,000 kg should be in N/m.")
     return Result((*tables, many), verdict, (), tuple(values))
 
@@ -402,7 +403,7 @@ def _by_start(words: str, masses: list[tuple[int, float]], rates: list[tuple[int
               printed: Array) -> Table:
     columns = ["start mass [kg] .0f"]
     for _, rate in rates:
-        columns += [f"from {rate:.0f} N/m: printed [%] .2f", "ours [%] +.4f"]
+        columns += [f"from {rate:.0f} N/m: published [%] .2f", "ridelog [%] +.4f"]
     rows = tuple((mass, *chain.from_iterable((float(printed[row, column]), error) for (column, _), error in zip(
         rates, found, strict=True))) for (row, mass), found in zip(masses, errors.tolist(), strict=True))
     return Table(f"Error of the {words}, by the start of the fit", tuple(columns), rows)
@@ -410,7 +411,7 @@ def _by_start(words: str, masses: list[tuple[int, float]], rates: list[tuple[int
 
 def _scatter(words: str, name: str, draws: Sequence[tuple[Fit, ...]]) -> list[tuple[Cell, ...]]:
     rows: list[tuple[Cell, ...]] = []
-    for way, found in zip(("white noise (the source's method)", "most likely noise model (ours)"), zip(*draws,
+    for way, found in zip(("white noise (the source's method)", "most likely noise model (ridelog)"), zip(*draws,
                                                                                                     strict=True),
                           strict=True):
         errors = np.array([error_percent(one, name) for one in found])
@@ -423,8 +424,8 @@ def _scatter(words: str, name: str, draws: Sequence[tuple[Fit, ...]]) -> list[tu
 T4_4 = Study("table_4_4", "Mass and both stiffnesses together, from 25 starts", "Table 4.4, section 4.4.4",
              "Simulated as in the source: the half car of Table 4.2 over the bump of 5.5.2 at 16.1 km/h, on a road of "
              "IRI 5 m/km that the fit does not know; sensor noise 0.05 m/s2 (the source names none).", _t4_4,
-             items=alike(("Table 4.4", "Table 4.5", "Table 4.6"), Word.BETTER, "From every start ours ends at one "
-                         "estimate; the printed errors differ."))
+             items=alike(("Table 4.4", "Table 4.5", "Table 4.6"), Word.BETTER, "From every start ridelog ends at one "
+                         "estimate; the published errors differ."))
 
 
 def _f4_19(effort: Workload) -> Result:
@@ -464,7 +465,7 @@ def _f4_19(effort: Workload) -> Result:
                       behind_s * BUMP_MPS / wheelbase_m, 0.97, 1.03, Word.NOT_REPRODUCIBLE),
             Statement("peak over the bump, over the r.m.s. on the road behind it", "the road's roughness is noise that "
                       "is added", float(np.abs(record.measured_mps2).max()) / road, 3.0, word=Word.NOT_REPRODUCIBLE)])
-    table = Table("Response in the two windows (printed as pictures only)", (
+    table = Table("Response in the two windows (published as pictures only)", (
         "window [m] .0f", "lasts [s] .1f", "peak [m/s2] .2f", "r.m.s. over the bump [m/s2] .2f",
         "r.m.s. behind it [m/s2] .2f", "share of the power from the bump [%] .0f"), tuple(rows))
     verdict = (f"As the text describes: bumps of {1000 * BUMP_HEIGHT_M:.0f} mm, the rear axle's "
@@ -478,7 +479,7 @@ F4_19 = Study("fig_4_19", "A bump's input and output in windows of 15 and 100 m"
               "Simulated as in the source: the bump of 5.5.2 (the text gives no size) at 16.1 km/h on a road of IRI 5 "
               "m/km that the input leaves out; sensor noise 0.05 m/s2.", _f4_19,
               items=alike(("Fig 4.19", "Fig 4.20"), Word.NOT_REPRODUCIBLE, "The bump, speed and road of the figures "
-                          "are not printed; the simulated response is as described."))
+                          "are not published; the simulated response is as described."))
 
 
 def _f4_21(effort: Workload) -> Result:
@@ -494,20 +495,20 @@ def _f4_21(effort: Workload) -> Result:
     numbers = np.stack([their_mass, mass, expected, 100 * (mass / TRUTH[MASS] - 1)], axis=1).tolist()
     rows = tuple((window, "very close to 875", *found) for window, found in zip(windows, numbers, strict=True))
     table = Table("Mass, by the length of the window", (
-        "window [m] .0f", "printed [kg]", "white noise, the source's method [kg] .1f", "ours [kg] .1f",
-        "standard error [kg] .1f", "error of ours [%] +.2f"), rows)
+        "window [m] .0f", "published [kg]", "white noise, the source's method [kg] .1f", "ridelog [kg] .1f",
+        "standard error [kg] .1f", "error of ridelog [%] +.2f"), rows)
     inside = int((np.abs(mass - TRUTH[MASS]) < 2 * expected).sum())
     verdict = ("As the source finds, the window hardly matters once both axles are over the bump (some 8 m): the bump "
                f"shows the mass, the road behind it almost nothing. In {inside} of {len(windows)} windows the truth "
                "lies within two standard errors; all share one road, so their errors are alike. In 5 m, where only "
                "the front axle crosses the bump, the source's method is a little less accurate.")
     picture = Picture(Curves("Mass and its standard error", "window [m]", "mass [kg]", (
-        Line("ours", np.array(windows), mass, expected),
+        Line("ridelog", np.array(windows), mass, expected),
         Line("white noise, the source's method", np.array(windows), their_mass, dots=True)), (TRUTH[MASS], "875 kg")),
         "the mass from windows of 5 to 100 m, very close to 875 kg for each")
     values = tuple(Value(f"mass, the worst window from {least:g} m, {way} [kg]", TRUTH[MASS], _worst(
         found, np.array(windows) >= least), very_close * TRUTH[MASS], Word.NOT_REPRODUCIBLE)
-                   for way, found, least in (("the source's method", their_mass, 10.0), ("ours", mass, 0.0)))
+                   for way, found, least in (("the source's method", their_mass, 10.0), ("ridelog", mass, 0.0)))
     return Result((table,), verdict, (picture,), values)
 
 
@@ -519,7 +520,7 @@ F4_21 = Study("fig_4_21", "Mass from windows of 5 to 100 m", "Fig 4.21, section 
               "Simulated as in the source: one bump (of 5.5.2; the text gives no size) at the start of the window, "
               "16.1 km/h, on a road of IRI 5 m/km that the fit does not know.", _f4_21,
               items=(Item("Fig 4.21", Word.NOT_REPRODUCIBLE,
-                          "The size of the bump and the road are not printed; in the simulation the window hardly "
+                          "The size of the bump and the road are not published; in the simulation the window hardly "
                           "matters once both axles are over the bump, as the text says."),))
 
 
@@ -536,7 +537,7 @@ def _f4_22(effort: Workload) -> Result:
     said = f"within {printed_within_percent:g} % of 875"
     rows = tuple((float(start), said if 699 < start < 1101 else None, float(end), 100 * float(end / TRUTH[MASS] - 1))
                  for start, end in zip(starts, ends, strict=True))
-    table = Table("Mass, by the start of the fit", ("start [kg] .1f", "printed end [kg]", "our end [kg] .4f",
+    table = Table("Mass, by the start of the fit", ("start [kg] .1f", "published end [kg]", "ridelog ends at [kg] .4f",
                                                     "error [%] +.3f"), rows)
     verdict = (f"All {len(starts)} starts, from {starts[0]:.0f} to {starts[-1]:.0f} kg, end within {np.ptp(ends):.1g} "
                "kg of each other; the source's 20 lie within 6 % of 875 kg. The error of the estimate, "
@@ -556,8 +557,8 @@ F4_22 = Study("fig_4_22", "Mass from 20 starts, and from 300 to 3000 kg", "Fig 4
               "Simulated as in the source: one bump (of 5.5.2; the text gives no size) at 16.1 km/h on a road of IRI 5 "
               "m/km that the fit does not know.", _f4_22,
               items=(Item("Fig 4.22", Word.NOT_REPRODUCIBLE,
-                          "The size of the bump and the road are not printed; in the simulation all starts end at one "
-                          "mass, within the printed 6 %."),))
+                          "The size of the bump and the road are not published; in the simulation all starts end at "
+                          "one mass, within the published 6 %."),))
 
 
 def _f4_25(effort: Workload) -> Result:
@@ -581,7 +582,7 @@ def _f4_25(effort: Workload) -> Result:
                         "the larger the peak", float(np.diff(peaks, axis=0).min()), least=1e-3),
               Statement("largest change of the peak from one width to the next [m/s2]", "the larger the width, the "
                         "smaller the peak", float(np.diff(peaks, axis=1).max()), most=-1e-3))
-    return Result((Table("Largest acceleration, up or down (printed as a picture only)", columns, rows),), verdict,
+    return Result((Table("Largest acceleration, up or down (published as a picture only)", columns, rows),), verdict,
                   (picture,), values)
 
 
@@ -593,7 +594,7 @@ def _peak(height_m: float, width_m: float) -> float:
 F4_25 = Study("fig_4_25", "Peak acceleration by height and width of a bump", "Fig 4.25, section 4.4.2",
               "Simulated as in the source: half car of Table 4.2, 16.1 km/h, no roughness, no noise.", _f4_25,
               items=(Item("Fig 4.25", Word.AGREES,
-                          "A higher bump gives a larger peak, a wider one a smaller, as printed; the figure has no "
+                          "A higher bump gives a larger peak, a wider one a smaller, as published; the figure has no "
                           "numbers in the text."),))
 
 
@@ -616,11 +617,11 @@ def _f4_27(effort: Workload) -> Result:
                  for height, row in zip(heights[::shown], errors[::shown], strict=True))
     taken = Bump(_BUMP_AT_M_F4_27, 0.1016, 3.05)
     found = mass_and_bump(record, taken)
-    ours = Table("Ours: mass, bump and speed together, starting from a bump of 101.6 mm by 3.05 m", (
+    ours = Table("ridelog: mass, bump and speed together, starting from a bump of 101.6 mm by 3.05 m", (
         "number", "truth", "estimate .5g", "standard error .2g"), tuple(
         (words, truth, found.parameters[name], found.standard_errors[name]) for name, words, truth in numbers))
     best = [widths[int(np.abs(row).argmin())] for row in errors]
-    verdict = ("The slanting valley of the printed picture appears: the error is smallest for assumed bumps from "
+    verdict = ("The slanting valley of the published picture appears: the error is smallest for assumed bumps from "
                f"{1000 * heights[0]:.0f} mm by {best[0]:.2f} m up to {1000 * heights[-1]:.0f} mm by {best[-1]:.2f} m; "
                f"a wider assumed bump needs a higher one. The source cuts its errors at {printed_limit_percent:g} %, "
                "as the picture here does; its 72.2 mm is a misprint for 76.2 (3 in). The valley belongs to a fit of "
@@ -631,7 +632,7 @@ def _f4_27(effort: Workload) -> Result:
                             "error [%]", printed_limit_percent), "errors up to 50 % over heights of 3 to 9 in and "
                       "widths of 6 to 11 ft, from two viewpoints: a slanting dark blue region of correct masses")
     right_m = [float(np.interp(0.0, -row, widths)) for row in errors]  # the wider, the lighter the car
-    return Result((Table("The source's way: error of the mass, fitted alone (printed as a picture only)",
+    return Result((Table("The source's way: error of the mass, fitted alone (published as a picture only)",
                          columns, rows), ours),
                   verdict, (picture,), (
                       *about("4.4.3 smallest height", [Value("3 in [mm]", 72.2, 1000 * heights_m[0], 0.5,
@@ -659,7 +660,7 @@ F4_27 = Study("fig_4_27", "Error of the mass by the assumed height and width of 
               "Fig 4.27 (and 4.26), section 4.4.3",
               "Simulated as in the source: a bump of 150 mm by 2.60 m at 16.1 km/h, no roughness; sensor noise 0.05 "
               "m/s2.", _f4_27,
-              items=(Item("Fig 4.26", Word.AGREES, "A fit of the mass alone shows the printed valley."),
+              items=(Item("Fig 4.26", Word.AGREES, "A fit of the mass alone shows the published valley."),
                      Item("Fig 4.27", Word.BETTER,
                           "A fit of height, width and mass together finds them within a fraction of a per cent; a fit "
                           "of the mass alone has many answers."),
@@ -677,7 +678,7 @@ def _f4_30(effort: Workload) -> Result:
     front = (time_s >= front_s) & (time_s < front_s + wheelbase_m / BRIDGE_MPS)
     peaks = [float(np.abs(accel[part]).max()) for part in (front, time_s >= front_s + wheelbase_m / BRIDGE_MPS)]
     shaken_s = float(time_s[np.abs(accel) > still * max(peaks)].max()) - front_s
-    table = Table("A step of 38.1 mm at 48.3 km/h (printed as a picture only)", (
+    table = Table("A step of 38.1 mm at 48.3 km/h (published as a picture only)", (
         "rear axle behind the front [s] .3f", "peak from the front axle [m/s2] .2f", "from the rear axle [m/s2] .2f",
         "duration of the response [s] .1f"),
         ((wheelbase_m / BRIDGE_MPS, *peaks, shaken_s),))
@@ -706,7 +707,7 @@ def _blow_s(accel: Array, time_s: Array, part: npt.NDArray[np.bool_]) -> float:
 F4_30 = Study("fig_4_30", "Input and output of a bridge's step", "Fig 4.30, section 4.4.5",
               "Simulated: the car of Table 4.2 over a step of 38.1 mm at 48.3 km/h, no roughness, no noise.", _f4_30,
               items=(Item("Fig 4.30", Word.NOT_REPRODUCIBLE,
-                          "Height and speed of the figure are not printed; it is simulated under those of Fig 4.31."),))
+                          "Height and speed of the figure are not published; those of Fig 4.31 are simulated."),))
 
 
 _STEP_AT_M_F4_31 = 20.0
@@ -720,27 +721,27 @@ def _f4_31(effort: Workload) -> Result:
                                                       for height in effort.each(heights)), strict=True))
     in_proportion = TRUTH[MASS] * np.array(heights) / STEP_M
     table = Table("Mass found for each assumed height of the step", (
-        "assumed height [mm] .2f", "printed: in proportion [kg] .1f", "ours, residual as white noise [kg] .1f",
-        "ours, innovations form [kg] .1f"),
+        "assumed height [mm] .2f", "published: in proportion [kg] .1f", "ridelog, residual as white noise [kg] .1f",
+        "ridelog, innovations form [kg] .1f"),
         tuple(zip((1000 * np.array(heights)).tolist(), in_proportion.tolist(), white.tolist(), masses.tolist(),
                   strict=True)))
     taken = RoadInput(step=RoadStep(_STEP_AT_M_F4_31, heights_m[0]))
     place = {"step.height_m": heights_m[0], "step.start_m": _STEP_AT_M_F4_31}
     known, both = fitted(record, place, True, taken), fitted(record, {MASS: 700.0, **place}, True, taken)
-    ours = Table("Ours: the step estimated", (
+    ours = Table("ridelog: the step estimated", (
         "what is known", "height [mm] .2f", "its standard error [mm] .2f", "mass [kg] .1f",
         "its standard error [kg] .1f"), tuple(
         (words, 1000 * one.parameters["step.height_m"], 1000 * one.standard_errors["step.height_m"],
          one.parameters.get(MASS), one.standard_errors.get(MASS))
         for words, one in (("the mass, 875 kg", known), ("neither mass nor height", both))))
     powers = [float(np.polyfit(np.log(heights), np.log(ends), 1)[0]) for ends in (white, masses)]
-    verdict = ("As printed, the mass is exact at 38.1 mm and rises along a line, but not quite in proportion: it "
+    verdict = ("As published, the mass is exact at 38.1 mm and rises along a line, but not quite in proportion: it "
                f"varies as the power {powers[0]:.2f} of the assumed height, {powers[1]:.2f} in the innovations form, "
-               "because the mass also sets how fast the body swings back. That is why ours can find both at once, "
+               "because the mass also sets how fast the body swings back. That is why ridelog can find both at once, "
                f"{both.parameters[MASS]:.0f} ± {both.standard_errors[MASS]:.0f} kg and "
                f"{1000 * both.parameters['step.height_m']:.1f} ± {1000 * both.standard_errors['step.height_m']:.1f} "
                "mm, on a road without roughness. With a known mass, the car measures the step, as the source "
-               "proposes. The printed 48.3 m/s should be km/h.")
+               "proposes. The published 48.3 m/s should be km/h.")
     picture = Picture(Curves("Mass found for each assumed height of a step of 38.1 mm", "assumed height [mm]",
                              "mass [kg]", (Line("white noise", 1000 * np.array(heights), white),
                                            Line("innovations form", 1000 * np.array(heights), masses),
@@ -777,7 +778,7 @@ F4_31 = Study("fig_4_31", "Mass against the assumed height of a bridge's step", 
               "Simulated as in the source: a step of 38.1 mm at 48.3 km/h, no roughness; sensor noise 0.05 m/s2.",
               _f4_31,
               items=(Item("Fig 4.31", Word.BETTER,
-                          "Exact at the true height and linear, as printed; ours finds mass and height together."),
+                          "Exact at the true height and linear, as published; ridelog finds mass and height together."),
                      Item("4.4.5 height from a known mass", Word.AGREES,
                           "With a known mass the fit gives the step's height, as the text proposes."),
                      Item("4.4.5 speed", Word.MISPRINT, "30 mph are 48.3 km/h, not m/s.")))
@@ -797,10 +798,10 @@ def _f4_32(effort: Workload) -> Result:
     road = generate(gd_n0_from_iri(printed_iri), length_m, SPACING_M, seed)[: len(place_m)]
     stepped = road + bridge(step_at_m, -STEP_M)(place_m)
     plain, with_step = iri(road, SPACING_M), iri(stepped, SPACING_M)
-    verdict = (f"As printed, the step stands out: {peaks[0]:.1f} m/s2 against {peaks[1]:.1f} on the rest of the road. "
-               f"The step alone raises the IRI of these 100 m from {plain:.1f} to {with_step:.1f} "
+    verdict = (f"As published, the step stands out: {peaks[0]:.1f} m/s2 against {peaks[1]:.1f} on the rest of the "
+               f"road. The step alone raises the IRI of these 100 m from {plain:.1f} to {with_step:.1f} "
                "m/km; by the text's limit of 4 m/km it would still be a good bridge end, so an average over 100 m "
-               "hides it. The printed road is another random draw.")
+               "hides it. The published road is another random draw.")
     pictures = (Picture(Curves("A step on a road of IRI 2 m/km (Fig 4.32)", "distance [m]", "elevation [mm]",
                                (Line("road", place_m[::5], 1000 * stepped[::5]),)),
                         "a smooth road that steps down by 38.1 mm"),
@@ -820,8 +821,8 @@ def _f4_32(effort: Workload) -> Result:
 F4_32 = Study("fig_4_32", "A bridge's step on a smooth road, and the response of the car", "Fig 4.32, section 4.4.6",
               "Simulated as in the source: a step of 38.1 mm down at 48.3 km/h on a road of IRI 2 m/km.", _f4_32,
               items=(Item("Fig 4.32", Word.NOT_REPRODUCIBLE,
-                          "The printed road is another random draw; this one has the printed IRI within the scatter "
-                          "of such draws."),
+                          "The published road is another random draw; this one has the published IRI within the "
+                          "scatter of such draws."),
                      Item("Fig 4.33", Word.NOT_REPRODUCIBLE,
                           "The response to that road cannot be repeated; in a simulated one, the step stands out as "
                           "described.")))
@@ -843,11 +844,11 @@ def _f4_34(effort: Workload) -> Result:
                   comfort_word(float(found[0][index].max())).replace("_",
                                                                      " ")) for index, section in enumerate(SECTIONS_M))
     table = Table("Largest weighted r.m.s. acceleration", (
-        "section [m] .0f", "printed, nearly [m/s2] .1f", "ours [m/s2] .2f", f"least of {roads} roads .2f",
+        "section [m] .0f", "published, nearly [m/s2] .1f", "ridelog [m/s2] .2f", f"least of {roads} roads .2f",
         "largest .2f", "in words"), rows)
-    verdict = (f"Of the same size: up to {found[0][0].max():.2f} m/s2 in 1 m windows beside a printed value of nearly "
-               "1.5. The source does not give its road, the initial state of its filter or how it weights 1 m, which "
-               "this car passes in 1/13 s. In 10 m windows the weighted acceleration is already half of that.")
+    verdict = (f"Of the same size: up to {found[0][0].max():.2f} m/s2 in 1 m windows beside a published value of "
+               "nearly 1.5. The source does not give its road, the initial state of its filter or how it weights 1 m, "
+               "which this car passes in 1/13 s. In 10 m windows the weighted acceleration is already half of that.")
     lines = tuple(Line(f"{section:g} m sections", np.arange(section / 2, _LENGTH_M_F4_34, section), one)
                   for section, one in zip(SECTIONS_M, found[0], strict=True))
     picture = Picture(Curves("Weighted r.m.s. acceleration along the road; the step lies at 50 m", "distance [m]",
@@ -884,11 +885,11 @@ F4_34 = Study("fig_4_34", "Discomfort of a bridge's step, per metre and per 10 m
               "Simulated as in the source: a step of 38.1 mm down at 48.3 km/h on a road of IRI 2 m/km; weighting Wk.",
               _f4_34,
               items=(Item("Fig 4.34", Word.NOT_REPRODUCIBLE,
-                          "The road and the filter of the figure are not printed; in the simulation the discomfort "
-                          "per metre has the printed size."),
+                          "The road and the filter of the figure are not published; in the simulation the discomfort "
+                          "per metre has the published size."),
                      Item("Fig 4.35", Word.NOT_REPRODUCIBLE,
-                          "The road and the filter of the figure are not printed; in the simulation the step is still "
-                          "clear over 10 m.")))
+                          "The road and the filter of the figure are not published; in the simulation the step is "
+                          "still clear over 10 m.")))
 
 
 def _f4_36(effort: Workload) -> Result:
@@ -899,7 +900,7 @@ def _f4_36(effort: Workload) -> Result:
     # The car is linear: one height is enough for all.
     per_metre = np.array([_peak_f4_36(STEP_M, kmh / 3.6) for kmh in effort.each(speeds.tolist())]) / STEP_M
     peaks = np.outer(heights_m, per_metre)
-    table = Table("Largest a_w of a metre (printed as a picture only)", (
+    table = Table("Largest a_w of a metre (published as a picture only)", (
         "step [mm] .1f", *(f"{kmh:.0f} km/h [m/s2] .2f" for kmh in speeds),
         f"in words at {speeds[-1]:.0f} km/h"), tuple(
         (1000 * height, *row, comfort_word(row[-1]).replace("_", " "))
@@ -936,8 +937,8 @@ def _peak_f4_36(height_m: float, speed_mps: float) -> float:
 F4_36 = Study("fig_4_36", "Discomfort of a bridge's step by height and speed", "Fig 4.36, section 4.4.6",
               "Simulated as in the source: a step down on a road without roughness; a_w by Wk, per metre.", _f4_36,
               items=(Item("Fig 4.36", Word.NOT_REPRODUCIBLE,
-                          "The heights, speeds and limits of the figure are not printed; the one printed value, from "
-                          "Fig 4.34, has the size of ours."),))
+                          "The heights, speeds and limits of the figure are not published; the one published value, "
+                          "from Fig 4.34, has the size of that of ridelog."),))
 
 STUDIES = (T4_1, T4_2, T4_3, F4_3, F4_16, F4_18, T4_4, F4_19, F4_21, F4_22, F4_25, F4_27, F4_30, F4_31, F4_32, F4_34,
            F4_36)

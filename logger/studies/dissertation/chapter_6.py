@@ -88,19 +88,19 @@ def _t6_1(effort: Workload) -> Result:
     jobs = [*(case[1:] for case in CASES_T6_1), *((height, width, speed, road_iri) for height, width, speed in factors)]
     found = [_both_ways(*job, seed=seed) for seed, job in enumerate(effort.each(jobs))]
     cases, draws = found[:len(CASES_T6_1)], np.array(found[len(CASES_T6_1):])
-    printed = Table("Printed", ("bump .0f", "trial 1, mass [kg] .3f", "trial 1, error [%] .2f",
+    printed = Table("Published", ("bump .0f", "trial 1, mass [kg] .3f", "trial 1, error [%] .2f",
                                 "trial 2, mass [kg] .3f", "trial 2, error [%] .2f"), tuple(
         (float(number), masses[0], errors[0], masses[1], errors[1])
         for number, (masses, errors) in enumerate(zip(PRINTED_KG, PRINTED_PERCENT, strict=True), start=1)))
     one_by_one = Table("Simulated: assumed bump 150 mm by 2.60 m at 16.1 km/h; the true one differs by row", (
         "truth relative to the assumption", "the source's method: error of the mass [%] +.2f",
-        "ours, bump and speed estimated [%] +.2f", "its standard error [%] .2f"), tuple(
+        "ridelog, bump and speed estimated [%] +.2f", "its standard error [%] .2f"), tuple(
         (case[0], *errors) for case, errors in zip(CASES_T6_1, cases, strict=True)))
     theirs, ours, expected = draws.T
     rows: tuple[tuple[Cell, ...], ...] = (
-        ("printed, 8 drives", _rms_t6_1(np.array(PRINTED_PERCENT)), float(np.max(PRINTED_PERCENT)), None),
+        ("published, 8 drives", _rms_t6_1(np.array(PRINTED_PERCENT)), float(np.max(PRINTED_PERCENT)), None),
         (f"the source's method, {drives} simulated drives", _rms_t6_1(theirs), float(np.abs(theirs).max()), None),
-        ("ours, the same drives",
+        ("ridelog, the same drives",
          _rms_t6_1(ours), float(np.abs(ours).max()),
          float(100 * (np.abs(ours) < 2 * expected).mean())))
     many = Table(f"Random errors of 5 % r.m.s. in height, width and speed, on roads of IRI {road_iri:g} m/km", (
@@ -108,7 +108,7 @@ def _t6_1(effort: Workload) -> Result:
     by_trial = {f"Table 6.{trial}": _rms_t6_1(np.array(PRINTED_PERCENT)[:, trial - 1]) for trial in (1, 2)}
     per_percent = _per_percent_of_speed(cases)
     verdict = ("With a width or a speed 5 % off, the source's mass is about 5 or 11 % off; the height matters little. "
-               f"With all three off by 5 % r.m.s., its errors are {_rms_t6_1(theirs):.0f} % r.m.s. Of the printed "
+               f"With all three off by 5 % r.m.s., its errors are {_rms_t6_1(theirs):.0f} % r.m.s. Of the published "
                f"trials the second ({by_trial['Table 6.2']:.0f} %) is explained by that; the first "
                f"({by_trial['Table 6.1']:.0f} %) would take twice as much, or a speed that is "
                f"{by_trial['Table 6.1'] / per_percent:.0f} % off, while a speedometer may be {100 * speedometer:.0f} % "
@@ -116,19 +116,19 @@ def _t6_1(effort: Workload) -> Result:
                f"two. With bump and speed estimated together with the mass, the errors are {_rms_t6_1(ours):.1f} %, "
                "which come from the road's roughness, and the standard error says so.")
     values: tuple[Check, ...] = (*(one for item, rms in by_trial.items() for one in about(item, [
-        Statement("error of the speed that would explain the printed r.m.s. error [%]",
+        Statement("error of the speed that would explain the published r.m.s. error [%]",
                   "changes in speed are a possible "
                   "source of error", rms / per_percent, 0.0, 100 * speedometer, Word.NOT_REPRODUCIBLE)])),
         *about(tuple(by_trial), [
-            Statement("error with width or speed 5 % off, ours over the source's method",
+            Statement("error with width or speed 5 % off, ridelog's over that of the source's method",
                       "discrepancies of width and speed are "
                       "possible sources of error", _largest(cases, 1) / _largest(cases, 0), 0.0, 0.2,
                       Word.NOT_REPRODUCIBLE)]),
         *(one for trial, item in enumerate(by_trial) for one in about(item, [
-            Value(f"error of the printed mass, bump {bump} [%]", pair[trial],
+            Value(f"error of the published mass, bump {bump} [%]", pair[trial],
                   100 * abs(PRINTED_KG[bump - 1][trial] / TRUTH[MASS] - 1), 0.01, of_print=True)
             for bump, pair in enumerate(PRINTED_PERCENT, start=1)])))
-    errors = {"printed": np.ravel(PRINTED_PERCENT), "the source's method": theirs, "ours": ours}
+    errors = {"published": np.ravel(PRINTED_PERCENT), "the source's method": theirs, "ridelog": ours}
     scatter = Picture(Curves("Errors of the mass, sorted by size", "share of the drives [%]", "error of the mass [%]",
                              tuple(Line(name, 100 * (np.arange(len(found)) + 0.5) / len(found), np.sort(np.abs(found)))
                                    for name, found in errors.items())),
@@ -185,15 +185,15 @@ def _t6_3(effort: Workload) -> Result:
     jobs = [(step_m, iri, seed) for step_m, iri in cases for seed in range(roads)]
     drives = [_drive_t6_3(*job) for job in effort.each(jobs)]
     rows = tuple(_row_t6_3(*case, drives[number * roads:(number + 1) * roads]) for number, case in enumerate(cases))
-    printed = Table("Printed: the road assumed flat", (
+    printed = Table("Published: the road assumed flat", (
         "bump", "trial 1, mass [kg] .3f", "error [%] .2f", "trial 2, mass [kg] .3f", "error [%] .2f"), PRINTED_T6_3)
     table = Table(f"Simulated, 48.3 km/h; figures are r.m.s. over {roads} roads", (
-        "true step [mm] .1f", "IRI [m/km] .0f", "road assumed flat: our answer",
+        "true step [mm] .1f", "IRI [m/km] .0f", "road assumed flat: ridelog's answer",
         "step assumed a third too high, the source's method: error of mass [%] .1f",
-        "ours, height estimated: error of mass [%] .1f", "its standard error [%] .1f",
+        "ridelog, height estimated: error of mass [%] .1f", "its standard error [%] .1f",
         "mass known: error of height [mm] .1f", "its standard error [mm] .1f"), rows)
     verdict = ("The source assumed a flat road. A flat input moves no car, whatever its mass: ridelog refuses to answer"
-               ", and the printed masses, 12 to 60 % off, reflect the noise model and the road, not the car. A step "
+               ", and the published masses, 12 to 60 % off, reflect the noise model and the road, not the car. A step "
                "assumed a third too high makes the mass about 15 % wrong on a smooth road (Fig 4.31). With the height "
                "estimated together with the mass, a step of 38.1 mm gives both; the error grows with the road's "
                "roughness, and the standard error says how much. A step of half an inch on a rough road hardly shows "
@@ -216,7 +216,7 @@ def _t6_3(effort: Workload) -> Result:
                   "determine the step's height", max(abs(error / std) for error, std in (one.height for one in drives)),
                   0.0, 4.0, Word.NOT_REPRODUCIBLE)]),
         *(one for trial, item in enumerate(items) for one in about(item, [
-            Value(f"error of the printed mass, bump {bump} [%]", found[2 * trial + 1],
+            Value(f"error of the published mass, bump {bump} [%]", found[2 * trial + 1],
                   100 * abs(found[2 * trial] / TRUTH[MASS] - 1), 0.01, of_print=True)
              for bump, *found in PRINTED_T6_3])))
     grown = Picture(Curves("Error of the height found with a known mass, by the road's IRI", "IRI of the road [m/km]",
@@ -304,9 +304,9 @@ def _t6_5(effort: Workload) -> Result:
     sizes = ("height of a step [mm]", "depth of a dip of 0.6 m [mm]", "IRI over the window [m/km]")
     rows = tuple(_row_t6_5(printed, what, factor)
                  for printed, what, factor in zip(printed_rows, sizes, factors, strict=True))
-    table = Table("Size that would explain the printed word", (
-        "location .0f", "segment .0f", "printed perception", "printed reason", "speed [mph] .0f", "quantity",
-        "a_w per unit of it [m/s2] .4f", "from .0f", "to .0f", "our word for the middle of the range"), rows)
+    table = Table("Size that would explain the published word", (
+        "location .0f", "segment .0f", "published perception", "published reason", "speed [mph] .0f", "quantity",
+        "a_w per unit of it [m/s2] .4f", "from .0f", "to .0f", "ridelog's word for the middle of the range"), rows)
     verdict = ("Not reproducible: the records were never published, and no sizes are given. Computed backwards, the "
                f"three words require a step of {rows[0][7]:.0f} to {rows[0][8]:.0f} mm between two pavements, a "
                f"manhole {rows[1][7]:.0f} to {rows[1][8]:.0f} mm deep and a stretch of IRI {rows[2][7]:.0f} to "
@@ -359,7 +359,7 @@ T6_5 = Study("table_6_5", "Three revisited places, and the obstacles that would 
               "position of the obstacle in its window; random roads for the damage.", _t6_5,
               items=(Item("Table 6.5", Word.NOT_REPRODUCIBLE,
                           "Neither the records nor the sizes were published; a step, a manhole and damage of "
-                          "realistic sizes would explain the printed words."),))
+                          "realistic sizes would explain the published words."),))
 
 
 SPEEDS_MPH = tuple(range(10, 71, 10))
@@ -376,20 +376,20 @@ def _f6_6(effort: Workload) -> Result:
     rows = tuple((float(mph), slope, line.iri_per_accel_rms.slope, 100 * line.window_iri_per_accel_rms.spread,
                   *map(float, others)) for mph, slope, line, *others in
                  zip(SPEEDS_MPH, own.tolist(), drives, 100 * (two / own - 1), 100 * (heavy / own - 1), strict=True))
-    table = Table("IRI per r.m.s. acceleration [m/km per m/s2] (printed as pictures only)", (
+    table = Table("IRI per r.m.s. acceleration [m/km per m/s2] (published as pictures only)", (
         "speed [mph] .0f", "computed .3f", "from drives .3f", "spread of 25 ft windows [%] .0f",
         f"two people of {rms_calibration.PASSENGER_KG:g} kg more [%] +.1f", "twice the mass [%] +.1f"), rows)
     verdict = ("Fig 6.3, a diagram, leads from the response through the vehicle to the IRI; the rest agrees with the "
                "figures: r.m.s. acceleration grows with the root of Gd(n0), whatever the length of the road, so the "
                "trendlines are straight and parallel on logarithmic axes; with Eq 4.39 that gives one line through "
                "the origin for each speed, flatter at higher speeds; more mass lowers the acceleration at every "
-               "speed, so a given reading means a rougher road. The printed pictures have no numbers in the text. The "
-               "line holds for long roads of waviness 2; windows of 25 ft scatter about it, and on a road of another "
-               "waviness it drifts with speed (6.3.1, Fig 6.11). ridelog estimate is the better relation that the "
-               "source asks for.")
+               "speed, so a given reading means a rougher road. The published pictures have no numbers in the text. "
+               "The line holds for long roads of waviness 2; windows of 25 ft scatter about it, and on a road of "
+               "another waviness it drifts with speed (6.3.1, Fig 6.11). ridelog estimate is the better relation that "
+               "the source asks for.")
     factors = [one.accel_rms_per_root_gd.slope for one in drives]
     by_gd = Table("R.m.s. acceleration by degree of roughness: a factor times the root of Gd(n0) (Fig 6.4, 6.5)", (
-        "speed [mph] .0f", "printed", "factor [m/s2 per cm^1.5] .4f", "spread of 1 km roads [%] .1f",
+        "speed [mph] .0f", "published", "factor [m/s2 per cm^1.5] .4f", "spread of 1 km roads [%] .1f",
         *(f"at {gd:g} cm3 [m/s2] .3f" for gd in PRINTED_GD_CM3)),
         tuple((float(mph), "a power trendline", factor, 100 * one.accel_rms_per_root_gd.spread,
                *(factor * gd**0.5 for gd in PRINTED_GD_CM3))
@@ -473,7 +473,7 @@ def _f6_9(effort: Workload) -> Result:
     drift = np.array([[_bias_percent(mph, waviness, roads) for waviness in WAVINESS] for mph in speeds])
     own = np.array([100 * (one.iri_m_per_km.mean() / one.exact_m_per_km.mean() - 1) for one in ours])
     table = Table("IRI of a whole road beside the exact one, by speed", (
-        "speed [mph] .0f", "printed, by r.m.s. (Fig 6.11)",
+        "speed [mph] .0f", "published, by r.m.s. (Fig 6.11)",
         *(f"by r.m.s., waviness {waviness:g} [%] +.1f" for waviness in WAVINESS),
         f"ridelog estimate, waviness {WAVINESS[0]:g} [%] +.1f"), tuple(
         (float(mph), PRINTED.get(mph, "between"), *map(float, row), float(one))
@@ -481,14 +481,14 @@ def _f6_9(effort: Workload) -> Result:
     drive = drive_over(road, windowed_mph * MPH_MPS, PS_2119)
     cut = [per_window(drive, PS_2119, window_m) for window_m in windows_m]
     windows = Table(f"IRI per window at {windowed_mph} mph, beside the exact one", (
-        "window [m] .2f", "printed", "windows .0f", "spread of the exact IRI [m/km] .2f",
+        "window [m] .2f", "published", "windows .0f", "spread of the exact IRI [m/km] .2f",
         "r.m.s. error by r.m.s. relation [m/km] .2f", "r.m.s. error, ridelog estimate [m/km] .2f",
         "exact within two standard errors [%] .0f"),
         tuple(_row_f6_9(window_m, one) for window_m, one in zip(windows_m, cut, strict=True)))
-    verdict = ("The printed drift appears, and has a cause. On a road of waviness 2, for which the line of Fig 6.6 "
+    verdict = ("The published drift appears, and has a cause. On a road of waviness 2, for which the line of Fig 6.6 "
                f"was made, the relation stays within {np.abs(drift[:, 1]).max():.0f} %; on one of waviness "
                f"{WAVINESS[0]:g}, with more short waves, it reads {drift[0, 0]:+.0f} % at {speeds[0]} mph and "
-               f"{drift[-1, 0]:+.0f} % at {speeds[-1]}, with the printed signs, and on one of waviness "
+               f"{drift[-1, 0]:+.0f} % at {speeds[-1]}, with the published signs, and on one of waviness "
                f"{WAVINESS[-1]:g} the reverse: a slow car responds to short waves, a fast one to long waves, and one "
                "number per window cannot show which the road had. ridelog estimate infers the road wave by wave and "
                f"stays within {np.abs(own).max():.0f} % at every speed; in windows of 25 ft its error is "
@@ -565,7 +565,7 @@ F6_9 = Study("fig_6_9", "IRI from acceleration beside the exact one, by speed an
               items=(*alike(("Fig 6.9", "Fig 6.10"), Word.NOT_REPRODUCIBLE,
                             "The profile is not named; a random road replaces it."),
                      Item("Fig 6.11", Word.BETTER,
-                          "The drift with speed appears as printed and comes from the road's waviness; ridelog's "
+                          "The drift with speed appears as published and comes from the road's waviness; ridelog's "
                           "estimate does not drift."),
                      *alike([f"Fig 6.{number}" for number in range(12, 16)], Word.BETTER,
                             "At 40 mph the relation is right on average; the errors of ridelog's windows are half as "
@@ -584,7 +584,7 @@ def _f6_16(effort: Workload) -> Result:
                for number in (1, 3)}
     checks = {number: float(np.sqrt(np.mean(one.a_w_mps2**2)) / one.exact_m_per_km.mean())
               for number, one in stepped.items()}
-    table = Table("Weighted acceleration by speed (printed as pictures only)", (
+    table = Table("Weighted acceleration by speed (published as pictures only)", (
         "speed [mph] .0f", "a_w per IRI [m/s2 per m/km] .4f", "spread of 1 km roads [%] .0f",
         "one road in the time domain .4f", *(f"IRI {level:g}" for level in (1, 2, 4, 8)),
         "a little uncomfortable from IRI [m/km] .1f"), tuple(
@@ -592,7 +592,7 @@ def _f6_16(effort: Workload) -> Result:
          *(comfort_word(one.a_w_per_iri.slope * level).replace("_", " ").replace(" uncomfortable", "")
            for level in (1, 2, 4, 8)),
          COMFORT_WORDS[-2][0] / one.a_w_per_iri.slope) for number, one in enumerate(lines)))
-    verdict = ("Discomfort grows in proportion to roughness, and with speed, as the text says. The printed pictures "
+    verdict = ("Discomfort grows in proportion to roughness, and with speed, as the text says. The published pictures "
                "have no numbers in the text. For this car a straight line through the origin holds for each speed, "
                f"because it is linear; from 10 to 70 mph it becomes {per_iri[-1] / per_iri[0]:.1f} times as steep, not "
                "seven times: on a road of waviness 2 the excitation grows with the square root of the speed, 2.6 "
@@ -648,7 +648,7 @@ def _f6_23(effort: Workload) -> Result:
     again = {mph: _biases_percent(mph, [one for one in PRINTED_MPH if PRINTED_MPH[one] == mph], effort)
              for mph in PRINTED_KMH}
     by_speed = Table("Roughness by speed: windows of 25 ft", (
-        "printed speed [mph] .0f", "segments .0f", "exact mean IRI [m/km] .2f", "printed, by r.m.s.",
+        "published speed [mph] .0f", "segments .0f", "exact mean IRI [m/km] .2f", "published, by r.m.s.",
         "by r.m.s. [%] +.1f", "ridelog estimate [%] +.1f", "by r.m.s. on more roads [%] +.1f",
         "its standard error [%] .1f", "further roads .0f", "r.m.s. error by r.m.s. [m/km] .2f",
         "ridelog estimate [m/km] .2f"), tuple(
@@ -656,8 +656,8 @@ def _f6_23(effort: Workload) -> Result:
         for mph in speeds))
     a_w = np.concatenate([one.a_w_mps2 for one in found.values()])
     shares = comfort_shares(a_w)
-    comfort = Table("Comfort of all windows", ("word of Table 2.5", "printed (6.5.2)",
-                                               "ours [% of windows] .1f"), tuple(
+    comfort = Table("Comfort of all windows", ("word of Table 2.5", "published (6.5.2)",
+                                               "ridelog [% of windows] .1f"), tuple(
         (word.replace("_", " "), PRINTED_COMFORT.get(word, "not named"), share)
         for word, share in shares.items()))
     slow, fast = (np.concatenate([again[mph] for mph, kmh in PRINTED_KMH.items()
@@ -774,8 +774,8 @@ F6_23 = Study("fig_6_23", "37 road segments at their speeds: a map of roughness 
               items=(Item("Fig 6.19", Word.NOT_REPRODUCIBLE,
                           "A map of the places, which were published in no other form."),
                      Item("Fig 6.20", Word.AGREES,
-                          "Our words change at the limits of Tables 2.3 and 2.5, on which the scales are based; the "
-                          "colours are not given."),
+                          "ridelog's words change at the limits of Tables 2.3 and 2.5, on which the scales are based; "
+                          "the colours are not given."),
                      *alike(("Fig 6.21", "Fig 6.22"), Word.NOT_REPRODUCIBLE,
                             "The record was never published; a simulated one is cut into the same windows."),
                      Item("Fig 6.23", Word.NOT_REPRODUCIBLE,

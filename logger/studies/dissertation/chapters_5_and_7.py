@@ -89,7 +89,7 @@ from logger.vehicle.vehicle import SensorPlace, Vehicle
 HOW = ("Simulated: the five-storey building of 5.3 with 1.34 % of damping, pulled aside and released, 75 s at 100 Hz; "
        "a PS-2119 with steps of 0.01 g and a BMA220 with steps of 0.0625 g and 2 % less gain on its top floor. The "
        "source measured; its records were never published. The duration, 75 s, was chosen so that the r.m.s. is near "
-       "the printed one; gains and noise of the sensors are assumed.")
+       "the published one; gains and noise of the sensors are assumed.")
 
 
 def _t5_1(effort: Workload) -> Result:
@@ -104,21 +104,21 @@ def _t5_1(effort: Workload) -> Result:
     values: tuple[Check, ...] = (*about("Table 5.1", [
         *(Value(f"r.m.s. of the {name} [g]", printed, one.rms_g, of_one_size_g, Word.NOT_REPRODUCIBLE)
           for name, printed, one in zip(("PS-2119", "iPhone"), PRINTED_RMS, compared[0], strict=True)),
-        Value("r.m.s. of the PS-2119, in the printed unit [m/s2]", PRINTED_RMS[0],
+        Value("r.m.s. of the PS-2119, in the published unit [m/s2]", PRINTED_RMS[0],
               first.rms_g * STANDARD_GRAVITY_MPS2, 0.01, Word.MISPRINT)]),
         *about("Eq 5.1", [
             Value("difference of the two [%]", printed_difference_percent, float(np.mean(differences)), 2.0,
                   Word.NOT_REPRODUCIBLE),
-            Value("difference of the printed r.m.s. [%]", printed_difference_percent,
+            Value("difference of the published r.m.s. [%]", printed_difference_percent,
                   100 * abs(PRINTED_RMS[1] / PRINTED_RMS[0] - 1), rounding_percent, of_print=True)]),
         *about("Fig 5.8", [Statement("correlation of the two records", "similar peaks and matching phase angles",
                                      float(np.corrcoef(readings[0], readings[1])[0, 1]), 0.9,
                                      word=Word.NOT_REPRODUCIBLE)]))
-    verdict = (f"{first.rms_g:.4f} and {second.rms_g:.4f} g compare with the printed 0.0458 and 0.0445. Their similar "
-               "size proves nothing: the source does not say how long it recorded, and the duration here was chosen "
-               f"to match. That two sensors differ by a few per cent agrees ({min(differences):.1f} to "
-               f"{max(differences):.1f} % over {len(compared)} draws of their noise). The printed unit cannot be m/s2: "
-               "peaks of 0.198 and 0.085 g (Eq 5.3) and 1.34 % damping give about 0.05 g, ten times 0.05 m/s2.")
+    verdict = (f"{first.rms_g:.4f} and {second.rms_g:.4f} g compare with the published 0.0458 and 0.0445. Their "
+               "similar size proves nothing: the source does not say how long it recorded, and the duration here was "
+               f"chosen to match. That two sensors differ by a few per cent agrees ({min(differences):.1f} to "
+               f"{max(differences):.1f} % over {len(compared)} draws of their noise). The published unit cannot be "
+               "m/s2: peaks of 0.198 and 0.085 g (Eq 5.3) and 1.34 % damping give about 0.05 g, ten times 0.05 m/s2.")
     time_s = np.arange(shown) / five_storey.RATE_HZ
     records = tuple(Line(sensor.name, time_s, readings[number][:shown])
                     for number, sensor in reversed(list(enumerate(SENSORS))))
@@ -155,19 +155,19 @@ def _t5_2(effort: Workload) -> Result:
     (ps2119, phone), = (compare_sensors() for _ in effort.each(range(1)))
     rows = tuple((float(mode), printed, *ours) for mode, (printed, *ours) in enumerate(
         zip(PRINTED_HZ, ps2119.peaks_hz, phone.peaks_hz, strict=True), start=1))
-    table = Table("Peaks of the spectrum", ("mode .0f", "printed, both sensors [Hz] .3f", "our PS-2119 [Hz] .3f",
-                                            "our BMA220 [Hz] .3f"), rows)
+    table = Table("Peaks of the spectrum", ("mode .0f", "published, both sensors [Hz] .3f",
+                                            "simulated PS-2119 [Hz] .3f", "simulated BMA220 [Hz] .3f"), rows)
     printed = 100 * damping_of_two_peaks(*printed_peaks_g, printed_cycles)
     damping = Table("Damping ratio by the decrement, Eq 5.2", (
-        "sensor", "printed, Eq 5.3 [%] .2f", "ours [%] .3f", "standard deviation [%] .3f"), tuple(
+        "sensor", "published, Eq 5.3 [%] .2f", "ridelog [%] .3f", "standard deviation [%] .3f"), tuple(
         (one.sensor.name, printed, 100 * one.decrement.damping_ratio, 100 * one.decrement.damping_std)
         for one in (ps2119, phone)))
-    verdict = ("The printed 0.074 Hz is a misprint for the 0.7419 Hz of Table 5.4. As in the source, both sensors "
-               "show the same first two peaks; where steps of 0.0625 g bury the third, it is a few bins off. Ours lie "
-               "at the frequencies of the simulated model, 0.744, 2.594 and 4.523 Hz, in bins of 1/75 Hz; the real "
+    verdict = ("The published 0.074 Hz is a misprint for the 0.7419 Hz of Table 5.4. As in the source, both sensors "
+               "show the same first two peaks; where steps of 0.0625 g bury the third, it is a few bins off. Here they "
+               "lie at the frequencies of the simulated model, 0.744, 2.594 and 4.523 Hz, in bins of 1/75 Hz; the real "
                "building's second and third are 2 and 7 % lower. The logarithmic decrement over all peaks returns the "
                f"simulated {100 * DAMPING_RATIO:.2f} %, with a standard error; Eq 5.3 uses two peaks (rounded as "
-               "printed, they give 1.35). The table above Eq 5.3 has 0.8545 m/s2 where Eq 5.3 has 0.085 g; with "
+               "published, they give 1.35). The table above Eq 5.3 has 0.8545 m/s2 where Eq 5.3 has 0.085 g; with "
                "0.08545 g the ratio is 1.34 %.")
     (begin_s, first), (end_s, last) = printed_rows
     values = (*about("Table 5.2", [
@@ -201,10 +201,10 @@ def _line(number: int) -> Line:
 
 T5_2 = Study("table_5_2",
               "Modal frequencies from two sensors, and damping", "Table 5.2, section 5.3, with Eq 5.3", HOW, _t5_2,
-              items=(Item("Table 5.2", Word.MISPRINT, "The printed 0.074 Hz is 0.7419 Hz, as in Table 5.4."),
+              items=(Item("Table 5.2", Word.MISPRINT, "The published 0.074 Hz is 0.7419 Hz, as in Table 5.4."),
                      Item("Fig 5.9", Word.NOT_REPRODUCIBLE,
                           "The records were never published; those of two simulated sensors have peaks near the "
-                          "printed three."),
+                          "published three."),
                      Item("Eq 5.3", Word.MISPRINT,
                           "The ratio agrees for peaks of 0.1978 and 0.08545 g; the table above it has 0.8545 m/s2.")))
 
@@ -223,13 +223,13 @@ def _t5_4(effort: Workload) -> Result:
                   (*PRINTED_ERROR_PERCENT, *nothing), frequencies.tolist(), strict=True)
     rows = tuple((float(mode), *cells, *_near(found, cells[-1])) for mode, cells in enumerate(columns, start=1))
     table = Table("Natural frequencies", (
-        "mode .0f", "printed, measured [Hz] .4f", "printed, model [Hz] .4f", "printed difference [%] .2f",
-        "our eigenvalues [Hz] .4f", "ours from a simulated record [Hz] .4f", "standard deviation [Hz] .4f",
+        "mode .0f", "published, measured [Hz] .4f", "published, model [Hz] .4f", "published difference [%] .2f",
+        "eigenvalues by ridelog [Hz] .4f", "ridelog from a simulated record [Hz] .4f", "standard deviation [Hz] .4f",
         "its damping [%] .2f"), rows)
     verdict = (f"Modes 1 and 3 of the model agree to {_off(frequencies, 0):.2f} and {_off(frequencies, 2):.2f} %, the "
                "rounding of its dimensions, with a stiffness half way between 12EI/h^3 and 3EI/h^3 (the source swaps "
-               "the labels of the two). The printed 2.500 Hz of mode 2 is impossible: whatever the stiffness, these "
-               "masses have it at 3.488 times the first, 2.600 Hz with the printed first; the 1.88 % beside it are "
+               "the labels of the two). The published 2.500 Hz of mode 2 is impossible: whatever the stiffness, these "
+               "masses have it at 3.488 times the first, 2.600 Hz with the published first; the 1.88 % beside it are "
                "the difference of 2.548 from 2.500, so the slip stands in the model's value. From a simulated record "
                "of five PS-2119, ridelog finds all modes automatically, each with its standard deviation.")
     printed_hz = five_storey.PRINTED_MODEL_HZ
@@ -244,8 +244,8 @@ def _t5_4(effort: Workload) -> Result:
             *(Value(f"mode {mode} of the record [Hz]", printed, float(str(rows[mode - 1][5])), 0.1 * printed,
                     Word.NOT_REPRODUCIBLE)
               for mode, printed in enumerate(five_storey.PRINTED_MEASURED_HZ, start=1)),
-            *(Value(f"mode {mode}, difference of the printed frequencies [%]", printed, 100 * abs(model / measured - 1),
-                    0.02, of_print=True)
+            *(Value(f"mode {mode}, difference of the published frequencies [%]", printed,
+                    100 * abs(model / measured - 1), 0.02, of_print=True)
               for mode, (printed, model, measured) in enumerate(zip(
                   PRINTED_ERROR_PERCENT, printed_hz, five_storey.PRINTED_MEASURED_HZ, strict=True), start=1))]),
         *about("Fig 5.10", [Value("degrees of freedom, one for each floor", 5.0, float(len(frequencies)), 0.0)]),
@@ -332,11 +332,11 @@ def _t5_5(effort: Workload) -> Result:
             "effect; an uneven one sets the suspension swinging", float(str(row[4])) / float(str(rows[0][4])), 2.0,
             word=Word.NOT_REPRODUCIBLE)])))
     table = Table("Response on four surfaces", (
-        "surface", "speed [km/h] .1f", "IRI assumed [m/km] .1f", "printed, largest [g] .4f", "ours [g] .4f",
-        "printed f1 [Hz] .2f", "ours [Hz] .2f", "printed f2 [Hz] .2f", "ours [Hz] .2f"), rows)
+        "surface", "speed [km/h] .1f", "IRI assumed [m/km] .1f", "published, largest [g] .4f", "ridelog [g] .4f",
+        "published f1 [Hz] .2f", "ridelog f1 [Hz] .2f", "published f2 [Hz] .2f", "ridelog f2 [Hz] .2f"), rows)
     comb_hz = PRINTED[0][1] / 3.6 / float(structure_of(rav4()).behind_m[-1])
     verdict = ("Only the kind of spectrum agrees: the body bounces at 1 to 2.5 Hz, and there is a second, broad peak. "
-               "Segments of 2 s have bins 0.5 Hz apart, and the printed values are nearly multiples of that, so they "
+               "Segments of 2 s have bins 0.5 Hz apart, and the published values are nearly multiples of that, so they "
                "show no more. The measured peaks are two to five times the model's, and f2 lies above its 11 Hz on "
                "every surface: the sensor sat on the console, whose own vibration the source later removes with a "
                "low-pass (6.5), and which the car of Table 4.2 lacks. After slow bumps the model's wheels hardly hop, "
@@ -394,7 +394,7 @@ T5_5 = Study("table_5_5", "Resonances of the car on four surfaces", "Table 5.5, 
                             "2.5 Hz."),
                      *alike(("Fig 5.12", "Fig 5.14", "Fig 5.16", "Fig 5.18"), Word.NOT_REPRODUCIBLE,
                             "A photograph of the surface."),
-                     Item("5.5.1 model", Word.AGREES, "The half car's natural frequencies are the printed ones.")))
+                     Item("5.5.1 model", Word.AGREES, "The half car's natural frequencies are the published ones.")))
 
 
 TUBE_M = 0.00635
@@ -438,7 +438,7 @@ def _f5_22(effort: Workload) -> Result:
     drives = [(_drive(case, Conditions(0.0)), _drive(case, PS_2119.on(_IRI, seed)))
               for seed, case in enumerate(effort.each(cases), start=1)]
     table = Table("Effect of an obstacle on the car, and how well it shows the mass", (
-        "obstacle", "figure", "speed [km/h] .1f", "printed", "peak over the obstacle alone [m/s2] .3f",
+        "obstacle", "figure", "speed [km/h] .1f", "published", "peak over the obstacle alone [m/s2] .3f",
         "r.m.s. of the road [m/s2] .3f", "peak over road .2f", "standard error of the mass, one pass [%]",
         f"passes for {WANTED_PERCENT:g} %"),
         tuple(_row_f5_22(case, *pair) for case, pair in zip(cases, drives, strict=True)))
@@ -542,7 +542,7 @@ def _full_car(effort: Workload) -> Result:
     rows = tuple(_row_full_car(*case) for case in effort.each(cases))
     table = Table("A full car's record and two models of it", (
         "sensor left of the middle [m] .1f", "power shared by the tracks [%] .0f",
-        "printed, tracks assumed equal (6.5)", "r.m.s. over the half car's [%] +.1f",
+        "published, tracks assumed equal (6.5)", "r.m.s. over the half car's [%] +.1f",
         "half car on the left track: NRMSE .3f", "full car on both tracks: NRMSE .3f"), rows)
     apart, one_track = rows[len(rows) // 2 - 1], rows[0]
     verdict = ("Where both tracks are equal, a full car with its sensor in the middle moves like the half car: the "
@@ -599,7 +599,7 @@ def _half(road: Track) -> Run:
 
 
 FULL_CAR = Study("section_7_2_full_car", "A full car, where left and right tracks differ", "Section 7.2, second item",
-              "Nothing is printed: the source names it as future work. Simulated: two sides of the half car of Table "
+              "Nothing is published: the source names it as future work. Simulated: two sides of the half car of Table "
               "4.2 as one full car (rav4-2009-full) with a PS-2119 at 14 m/s over 400 m of two random tracks of IRI 4 "
               "m/km, which share all, some or none of their waves.", _full_car,
               items=(Item("7.2 full car", Word.BETTER,
@@ -616,7 +616,7 @@ def _input(effort: Workload) -> Result:
     probes = effort.count(10, 4)
     found = [(what, _mass_fit(which, probes)) for what, which in effort.each(fits)]
     mass = Table("Mass without any known input", (
-        "data", "printed (3.4: output only)", "truth [kg] .0f", "ours [kg] .0f", "error [%] +.1f",
+        "data", "published (3.4: output only)", "truth [kg] .0f", "ridelog [kg] .0f", "error [%] +.1f",
         "standard error [%] .1f"),
         tuple(_row_input(what, fit) for what, fit in found))
     profiles = [(one, *_profile(one, road)) for one in drives]
@@ -680,8 +680,8 @@ def _of_profile(drive: Run, _start_m: float, _spacing_m: float, true: Array, our
 
 
 INPUT = Study("section_7_2_input", "The input found from the response", "Section 7.2, first item",
-              "Nothing is printed: the source names it as future work. Simulated: the car of Table 4.2 with a PS-2119 "
-              "over 300 m of random road of IRI 4 m/km at 10 and 20 m/s.", _input,
+              "Nothing is published: the source names it as future work. Simulated: the car of Table 4.2 with a "
+              "PS-2119 over 300 m of random road of IRI 4 m/km at 10 and 20 m/s.", _input,
               items=(Item("7.2 input from response", Word.BETTER,
                           "ridelog finds the profile from the response of a known car, and the mass from two drives "
                           "over one road that nobody measured."),))
@@ -715,13 +715,13 @@ def _other_vehicles(effort: Workload) -> Result:
     inputs = effort.some(all_inputs)
     jobs: list[Vehicle | _Input] = [*cars, *inputs]
     rows = [_of_car(one) if isinstance(one, Vehicle) else _of_input(one) for one in effort.each(jobs)]
-    vehicles = Table("The vehicles of config/vehicles (printed: one car)", (
+    vehicles = Table("The vehicles of config/vehicles (published: one car)", (
         "vehicle", "model", "body from [Hz] .2f", "wheels to [Hz] .1f",
         f"IRI per r.m.s. at {RELATION_MPH} mph [m/km per m/s2] .2f", "peak over the bump of 5.5.2 [g] .2f",
         "standard error of its mass, one pass [%]"),
         tuple(rows[:len(cars)]))
     sizes = Table(f"Inputs of other sizes and speeds, the car of Table 4.2, road of IRI {_IRI_OTHER_VEHICLES:g} m/km", (
-        "input", "speed [mph] .0f", "printed", "peak [m/s2] .2f",
+        "input", "speed [mph] .0f", "published", "peak [m/s2] .2f",
         "standard error of the mass, one pass [%]"), tuple(rows[len(cars):]))
     relation = [float(str(row[4])) for row in vehicles.rows]
     verdict = (f"One reading means roads that differ by a factor of {max(relation) / min(relation):.1f} between cars, "
@@ -782,7 +782,7 @@ def _mass_error(car: Vehicle, shape: Shape, speed_mps: float, spacing_m: float) 
 
 OTHER_VEHICLES = Study("section_7_2_other_vehicles", "Other vehicles, other inputs, other speeds",
                        "Section 7.2, fourth item",
-              "Nothing is printed: the source names it as future work. Simulated: every vehicle that comes with "
+              "Nothing is published: the source names it as future work. Simulated: every vehicle that comes with "
               "ridelog over the bump of 5.5.2, and the car of Table 4.2 over other inputs, with a PS-2119 on a road of "
               "IRI 2 m/km; the obstacle is known, the road is not.", _other_vehicles,
               items=(Item("7.2 other vehicles", Word.BETTER,
@@ -798,7 +798,7 @@ def _sensor_position(effort: Workload) -> Result:
     felt = np.array([1 / rms_relation(known_vehicle(_at(place)), None, speeds).iri_per_accel_rms for place in at_m])
     change = 100 * (felt / felt[at_m.index(0.0)] - 1)
     table = Table("R.m.s. acceleration by the place of the sensor, over that at the centre of gravity (nothing "
-                  "printed)",
+                  "published)",
                   ("speed [mph] .0f", *(f"{place:+g} m ahead [%] +.1f" for place in at_m)),
                   tuple((float(mph), *map(float, row)) for mph, row in zip(speeds_mph, change.T, strict=True)))
     road = random_road(3.0, 230.0, 5)
@@ -840,9 +840,9 @@ def _at(ahead_m: float) -> Vehicle:
 
 SENSOR_POSITION = Study("section_7_2_sensor_position", "A sensor away from the centre of gravity",
                         "Section 7.2, third item",
-              "Nothing is printed: the source names it as future work. Computed for the half car of Table 4.2 on roads "
-              "of ISO 8608, and simulated over 230 m of random road of IRI 3 m/km with a PS-2119.", _sensor_position,
-              items=(Item("7.2 sensor position", Word.BETTER,
+              "Nothing is published: the source names it as future work. Computed for the half car of Table 4.2 on "
+              "roads of ISO 8608, and simulated over 230 m of random road of IRI 3 m/km with a PS-2119.",
+              _sensor_position, items=(Item("7.2 sensor position", Word.BETTER,
                           "The place of the sensor is part of the vehicle, so its pitch is part of the model."),))
 
 
@@ -860,7 +860,7 @@ def _speed(effort: Workload) -> Result:
         errors = (rms_error(by_rms, exact), rms_error(ours, exact), limit)
         rows.append((float(one_mph), *(100 * one for one in drift), *errors,
                      100 * float((np.abs(ours - exact) < 2 * std).mean())))
-    table = Table("Windows of 25 ft on roads of three wavinesses and one IRI (nothing printed)", (
+    table = Table("Windows of 25 ft on roads of three wavinesses and one IRI (nothing published)", (
         "speed [mph] .0f", "r.m.s. relation: spread between the roads [%] .0f", "ridelog estimate: spread [%] .0f",
         "r.m.s. error of a window, relation [m/km] .2f", "ridelog estimate [m/km] .2f", "smallest possible [m/km] .2f",
         "exact within two standard errors [%] .0f"), tuple(rows))
@@ -883,9 +883,9 @@ def _speed(effort: Workload) -> Result:
 
 
 SPEED = Study("section_7_2_speed", "An IRI that does not drift with the speed", "Section 7.2, fifth item",
-              "Nothing is printed: the source names it as future work. Simulated: the car of Table 4.2 with a PS-2119 "
-              "at 10 to 70 mph over 230 m each of random roads of IRI 3 m/km and waviness 1.6, 2 and 2.4.", _speed,
-              items=(Item("7.2 speed", Word.BETTER,
+              "Nothing is published: the source names it as future work. Simulated: the car of Table 4.2 with a "
+              "PS-2119 at 10 to 70 mph over 230 m each of random roads of IRI 3 m/km and waviness 1.6, 2 and 2.4.",
+              _speed, items=(Item("7.2 speed", Word.BETTER,
                           "The estimate infers the road wave by wave, so the speed of the drive cancels."),))
 
 STUDIES = (T5_1, T5_2, T5_4, T5_5, F5_22, FULL_CAR, INPUT, OTHER_VEHICLES, SENSOR_POSITION, SPEED)

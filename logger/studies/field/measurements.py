@@ -66,13 +66,13 @@ def _five_modes(effort: Workload) -> Result:
                "determine a damping ratio no better. Versions of the example differ in the record's length; that of "
                "the current one is used, 300 s.")
     table = Table("The first record", (
-        "mode .0f", "true [Hz] .3f", "printed [Hz] .3f", "ours [Hz] .3f", "its standard error [Hz] .3f",
-        "printed damping .3f", "ours .4f", "its standard error .4f"), tuple(
+        "mode .0f", "true [Hz] .3f", "published [Hz] .3f", "ridelog [Hz] .3f", "its standard error [Hz] .3f",
+        "published damping .3f", "ridelog .4f", "its standard error .4f"), tuple(
         (float(mode), *map(float, row)) for mode, row in enumerate(zip(
             PRINTED_TRUE_HZ, printed_hz, hz, hz_std, printed_damping, damping, damping_std, strict=True), start=1)))
     picture = Picture(Curves("Damping ratio of each mode, in each record", "frequency [Hz]", "damping ratio", (
-        Line("ours", np.tile(true_hz, len(numbers)), numbers[:, :, 1].ravel(), dots=True),
-        Line("printed", np.array(printed_hz), np.array(printed_damping), dots=True)),
+        Line("ridelog", np.tile(true_hz, len(numbers)), numbers[:, :, 1].ravel(), dots=True),
+        Line("published", np.array(printed_hz), np.array(printed_damping), dots=True)),
         level=(printed_true_damping, "true")), "one record's damping ratios, as numbers")
     return Result((table,), verdict, (picture,), tuple(values))
 
@@ -98,7 +98,7 @@ FIVE_MODES = Study(
     "floor, 10 % noise (20 dB); 300 s at 20 Hz, the rate to which the example decimates.", _five_modes,
     items=(Item("five modes at 20 dB", Word.BETTER,
                 "ridelog finds all five automatically, each with a standard error."),),
-    source="D. P. Pasca et al., pyOMA2, Examples/Example1.ipynb, printed January 2025")
+    source="D. P. Pasca et al., pyOMA2, Examples/Example1.ipynb, January 2025")
 
 
 def _mass_from_a_bump(effort: Workload) -> Result:
@@ -117,13 +117,13 @@ def _mass_from_a_bump(effort: Workload) -> Result:
     rms = float(np.sqrt(np.mean(errors**2)))
     # A scatter of n draws is itself off by its share 1 / sqrt(2 n).
     near = 3.0 * scatter / np.sqrt(2 * len(errors))
-    values = (Statement("error of the mass, r.m.s. [%]", "0.07 % off, in our own runs of SciPy and lmfit", rms, 0.0,
+    values = (Statement("error of the mass, r.m.s. [%]", "0.07 % off by SciPy and lmfit", rms, 0.0,
                         scatter + float(near), Word.NOT_REPRODUCIBLE),
               Statement("stated standard error over that of the record", "the same",
                         float(given.mean()) / scatter,
                         1 - float(near) / scatter, 1 + float(near) / scatter, Word.NOT_REPRODUCIBLE))
     inside = float(np.mean(np.abs(errors) < 2 * given))
-    table = Table("The mass from one bump (nothing of it is printed)", (
+    table = Table("The mass from one bump (nothing of it is published)", (
         "package, run by us", "error [%] +.2f", "its standard error [%] .2f"),
         (*peers, (f"ridelog, r.m.s. of {len(errors)} records", rms, float(given.mean()))))
     verdict = (f"The mass is {rms:.2f} % off (r.m.s. over {len(errors)} records), as close as the record's noise "
@@ -131,7 +131,7 @@ def _mass_from_a_bump(effort: Workload) -> Result:
                "Packages that are given the car's equations do equally well; the others find frequencies but no mass. "
                "The paper finds all parameters of a car by a genetic algorithm.")
     picture = Picture(Curves("Error of the mass, record by record", "record", "error [%]", (
-        Line("ours", np.arange(1.0, len(errors) + 1), errors, given, dots=True),)))
+        Line("ridelog", np.arange(1.0, len(errors) + 1), errors, given, dots=True),)))
     return Result((table,), verdict, (picture,), values)
 
 
@@ -177,12 +177,12 @@ def _lab_examination(effort: Workload) -> Result:
         rows.append((goal["name"], f"{'>=' if at_least else '<='} {wanted:.0f} %", f"{hits} of {cases}", share, low,
                      high))
     seeds = f"{'release' if counts['release'] else 'development'} seeds {counts['first_seed']} to {counts['last_seed']}"
-    table = Table(f"Counts of the examination (printed in docs/examination.md), {seeds}", (
+    table = Table(f"Counts of the examination (published in docs/examination.md), {seeds}", (
         "asked", "goal", "true of", "share [%] .1f", "at least [%] .1f", "at most [%] .1f"), tuple(rows))
     verdict = (f"{counts['cases']} of {counts['asked']} cases were given to the lab, {seeds}, made by a simulator that "
                f"shares no code with it. By the measured shares, {met} of {len(rows)} goals are met; by the far end of "
-               f"the 95 % interval, {surely} are. This examination is our own: nobody else has published one. As it "
-               "takes hours, it was not repeated here, and nothing is compared with a print.")
+               f"the 95 % interval, {surely} are. This examination is ridelog's own: nobody else has published one. As "
+               "it takes hours, it was not repeated here, and nothing is compared with a print.")
     at = np.arange(1.0, len(rows) + 1)
     shares, lows, highs = (np.array([row[place] for row in rows], dtype=np.float64) for place in (3, 4, 5))
     picture = Picture(Curves("Shares with their 95 % intervals", "row of the table", "cases [%]", (
@@ -196,7 +196,7 @@ LAB_EXAMINATION = Study(
     "Counts of cases from the last published examination; the intervals are computed from them.",
     _lab_examination,
     items=(Item("the lab's examination", Word.NOT_REPRODUCIBLE,
-                "It is our own, takes hours and was not repeated here; its counts are shown with their intervals."),),
+                "It takes hours and was not repeated here; its counts are shown with their intervals."),),
     source="ridelog's own examination, docs/examination.md")
 
 STUDIES = (FIVE_MODES, MASS_FROM_A_BUMP, LAB_EXAMINATION)

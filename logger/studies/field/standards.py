@@ -29,22 +29,22 @@ def _iri_check_profile(effort: Workload) -> Result:
     exact = float((ends[0] + ends[1])[0, 0])  # held over the step, as in the print
     values += about("IRI input coefficient",
                     [Value("first input coefficient at 0.25 m", 5.476107e-3, exact, 5e-10, Word.MISPRINT)])
-    verdict = ("The running IRI of the pulse agrees to the last printed digit (all 120 values, within 7e-6 m/km). The "
-               "first printed input coefficient is too small by 1e-7: a road of constant slope would have an IRI "
+    verdict = ("The running IRI of the pulse agrees to the last published digit (all 120 values, within 7e-6 m/km). "
+               "The first published input coefficient is too small by 1e-7: a road of constant slope would have an IRI "
                "above 0, so the exact value is used.")
     printed_m, printed_iri = np.array(PRINTED_IRI_CHECK_PROFILE, dtype=np.float64).T
     picture = Picture(Curves("Running IRI of the pulse", "distance [m]", "IRI from 0 to that distance [m/km]", (
-        Line("ours", np.array(at_m[1:], dtype=np.float64), running),
-        Line("printed", printed_m, printed_iri, dots=True))),
+        Line("ridelog", np.array(at_m[1:], dtype=np.float64), running),
+        Line("published", printed_m, printed_iri, dots=True))),
         "a table of 120 running values, of which five are compared")
     return Result((), verdict, (picture,), tuple(values))
 
 
 IRI_CHECK_PROFILE = Study(
     "iri_check_profile", "The published check of an IRI program", "Pages 41 and 42",
-    "A pulse of 20 mm over 4 m at 0.25 m spacing, without a moving average, as printed.", _iri_check_profile,
+    "A pulse of 20 mm over 4 m at 0.25 m spacing, without a moving average, as published.", _iri_check_profile,
     items=(Item("IRI check profile", Word.AGREES, "The running IRI agrees to the last digit."),
-           Item("IRI input coefficient", Word.MISPRINT, "The first one is printed 1e-7 too small.")),
+           Item("IRI input coefficient", Word.MISPRINT, "The first one is published 1e-7 too small.")),
     source="Sayers, Gillespie, Paterson, World Bank Technical Paper 46, 1986")
 
 
@@ -64,13 +64,13 @@ def _golden_car_gain(effort: Workload) -> Result:
     ours = (*peaks, rising, falling)
     values = tuple(Value(f"{name} [cycle/m]", theirs, mine, share * theirs)
                    for name, theirs, mine in zip(names, printed, ours, strict=True))
-    verdict = ("The peaks and the half-gain points lie within 5 % of the printed ones, which is as closely as they "
+    verdict = ("The peaks and the half-gain points lie within 5 % of the published ones, which is as closely as they "
                f"can be read off a figure. At its peaks the gain is {gain[slow].max():.2f} and "
                f"{gain[~slow].max():.2f}; waves shorter than {1 / falling:.2f} m or longer than {1 / rising:.0f} m "
                "count for less than half.")
     picture = Picture(Curves("Gain of the IRI's car at 80 km/h, for slopes", "wave number [cycle/m]", "gain", (
-        Line("ours", wave_number, gain),
-        Line("printed, half", np.array(printed_halves_cpm), np.full(2, 0.5), dots=True)), log_x=True),
+        Line("ridelog", wave_number, gain),
+        Line("published, half", np.array(printed_halves_cpm), np.full(2, 0.5), dots=True)), log_x=True),
         "the gain for slopes by wave number, two humps at 0.065 and 0.42 cycle/m, down to 0.5 at 0.033 and 0.8")
     return Result((), verdict, (picture,), values)
 
@@ -78,7 +78,7 @@ def _golden_car_gain(effort: Workload) -> Result:
 GOLDEN_CAR_GAIN = Study(
     "golden_car_gain", "Waves to which the IRI responds", "Response of the IRI filter",
     "Computed for the Golden Car as a continuous system, without the moving average.", _golden_car_gain,
-    items=(Item("Golden Car gain curve", Word.AGREES, "Peaks and half gains lie where they are printed, within 5 %."),),
+    items=(Item("Golden Car gain curve", Word.AGREES, "Peaks and half gains lie within 5 % of the published ones."),),
     source="Sayers and Karamihas, The Little Book of Profiling, University of Michigan, 1998")
 
 
@@ -105,14 +105,14 @@ def _iso_2631_factors(effort: Workload) -> Result:
                 abs(weighting.response(float(hz)))), rounding * digit, word)])
     wrong = next(one for one in values if one.word is Word.MISPRINT)
     off = [abs(one.difference) for one in values if one is not wrong]
-    verdict = (f"Of {len(values)} factors all but one agree to the printed digit, {np.mean(off):.2f} off on average; "
-               "they are those of the formula at the nominal frequencies. Wd at 10 Hz is printed as 212; the formula "
+    verdict = (f"Of {len(values)} factors all but one agree to the published digit, {np.mean(off):.2f} off on average; "
+               "they are those of the formula at the nominal frequencies. Wd at 10 Hz is published as 212; the formula "
                "gives 202, and so does a smooth curve through the neighbours, 253 and 161.")
     at_hz = np.array(HZ, dtype=float)
     picture = Picture(Curves("Factors of Wk and Wd", "frequency [Hz]", "factor times 1000", tuple(
         line for name, weighting in (("wk", WK), ("wd", WD)) for line in (
-            Line(f"{name}, ours", at_hz, 1000 * np.abs(weighting.response(at_hz))),
-            Line(f"{name}, printed", at_hz, np.array(PRINTED_ISO_2631_FACTORS[name], dtype=float), dots=True))),
+            Line(f"{name}, ridelog", at_hz, 1000 * np.abs(weighting.response(at_hz))),
+            Line(f"{name}, published", at_hz, np.array(PRINTED_ISO_2631_FACTORS[name], dtype=float), dots=True))),
             log_x=True, log_y=True),
         "a table of factors from 0.02 to 400 Hz, of which those from 0.5 to 80 Hz are compared")
     return Result((), verdict, (picture,), tuple(values))
@@ -121,9 +121,9 @@ def _iso_2631_factors(effort: Workload) -> Result:
 ISO_2631_FACTORS = Study(
     "iso_2631_factors", "Factors of Wk and Wd at one-third-octave frequencies", "Table 3",
     "The magnitude of the weightings' formulas at the nominal frequencies from 0.5 to 80 Hz.", _iso_2631_factors,
-    items=(Item(_ITEMS["wk"], Word.AGREES, "Every factor agrees to the printed digit."),
-           Item(_ITEMS["wd"], Word.MISPRINT, "All factors agree except that at 10 Hz, which is printed as 212 instead "
-                                             "of 202.")),
+    items=(Item(_ITEMS["wk"], Word.AGREES, "Every factor agrees to the published digit."),
+           Item(_ITEMS["wd"], Word.MISPRINT, "All factors agree except that at 10 Hz, which is published as 212 "
+                                             "instead of 202.")),
     source="ISO 2631-1:1997, Mechanical vibration and shock: evaluation of human exposure to whole-body vibration")
 
 
@@ -159,8 +159,8 @@ def _iso_8041_bursts(effort: Workload) -> Result:
     verdict = (f"Wk agrees within {worst['wk']:.2%}, Wd within {worst['wd']:.2%}. ridelog applies the formula of the "
                "standard to the whole record; a plain bilinear transform at 100 Hz is less accurate above 8 Hz.")
     at = np.array(teeth_counts[:-1], dtype=float)
-    lines = [Line(f"{name}, {who}", at, np.array(one[:-1]), dots=who == "printed") for name in found
-             for who, one in (("ours", found[name]), ("printed", PRINTED_MPS2[name]))]
+    lines = [Line(f"{name}, {who}", at, np.array(one[:-1]), dots=who == "published") for name in found
+             for who, one in (("ridelog", found[name]), ("published", PRINTED_MPS2[name]))]
     picture = Picture(Curves("Weighted r.m.s. of bursts by the number of teeth", "teeth in 10 s",
                              "weighted r.m.s. [m/s2]", tuple(lines), log_x=True, log_y=True),
                       "a table of responses to bursts of 1 to 16 teeth, and to a continuous train")
@@ -171,7 +171,7 @@ ISO_8041_BURSTS = Study(
     "iso_8041_bursts", "Weighted r.m.s. of saw-tooth bursts", "Response to signal bursts",
     "Saw teeth of 1 m/s2 with a period of 2 pi/100 s, for 60 s, at 20,000 samples a second.", _iso_8041_bursts,
     items=(Item("ISO 8041 bursts", Word.AGREES,
-                "Wk agrees within 0.25 % and Wd within 1.5 % of the printed three figures."),),
+                "Wk agrees within 0.25 % and Wd within 1.5 % of the published three figures."),),
     source="ISO 8041:2005, Human response to vibration: measuring instrumentation")
 
 STUDIES = (IRI_CHECK_PROFILE, GOLDEN_CAR_GAIN, ISO_2631_FACTORS, ISO_8041_BURSTS)
