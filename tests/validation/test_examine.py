@@ -203,7 +203,7 @@ def test_goals_are_counted_over_the_cases_that_they_ask() -> None:
 
 def test_the_report_says_what_the_records_hold() -> None:
     text = markdown(RECORDS, 14, "m.svg")
-    assert "13 of 14 cases sat" in text
+    assert "13 of 14 cases are done" in text
     assert re.search(r"\| wandering \| 11 \| dry_friction \(5\) \| dry_friction, unexplained \|  \|", text)
     assert re.search(r"\| one \| 4 \| dry_friction \(0.1\) \| payload \| nobody could see it \|", text)
     assert re.search(r"\| outsider \| 7 \| trailer \(5\) \| dry_friction \| akin \|", text)

@@ -53,7 +53,7 @@ TITLE = "The lab examined"
 COMMAND = "python -m tests.validation.examine"
 _LONGEST_S, _MOST_MB, _FULL = 60.0, 1000.0, (60.0,) * 4
 _WORDS = {"none": "nothing missing", "one": "one effect", "two": "two effects", "three": "three effects",
-          "outsider": "one off the list", "two_outsider": "one on the list and one off it",
+          "outsider": "an unlisted effect", "two_outsider": "a listed effect and an unlisted one",
           "wandering": "one effect or none where the distance wanders"}
 
 
@@ -88,7 +88,7 @@ def parts(records: Sequence[Record]) -> list[Part]:
         Part("Time and memory", _cost(records)),
         Part("Wrong verdicts", ["What these cases hid and what was said. For an effect off the list, the nearest "
                                 "listed one is marked akin."], _wrong(records)),
-        Part("Wrong numbers", ["Verdicts that name all effects, with an error or a number outside the goal."],
+        Part("Wrong parameters", ["Verdicts that name all effects, with an error or a parameter outside the goal."],
              _wrong_numbers(records)),
         Part("What nobody could see", [
             "In these cases the car's own parameters and the distance, within their tolerances, reproduce the weakest "
@@ -112,15 +112,15 @@ def opening(records: Sequence[Record], asked: int) -> list[str]:
              "Each was given to `ridelog diagnose`, and the effects that it named to `ridelog add-effect`. "
              f"Made by `{COMMAND}{' --release' if release else ''}`."]
     if len(records) < asked:
-        lines.append(f"The examination is not over: {len(records)} of {asked} cases sat.")
+        lines.append(f"The examination is not over: {len(records)} of {asked} cases are done.")
     if (programs := len({record["source"] for record in records})) > 1:
-        lines.append(f"The program was changed while it went on: {programs} states of it answered.")
+        lines.append(f"The program was changed in the meantime: {programs} states of it answered.")
     missed = [goal for goal in goals(records) if goal.found.of and not goal.met]
     lines.append("All goals that are shares of cases are met." if not missed else
                  f"Goals missed: {'; '.join(f'{_uncapital(goal.name)} ({_share(goal.found)})' for goal in missed)}.")
     confused = sum(map(by_confusion, of_kind(records, "one")))
-    lines.append(f"Of the right answers to one effect, {confused} named another effect first and listed the right one "
-                 "as not distinguishable from it.")
+    lines.append(f"In {confused} of the right answers to one effect, another effect was named first and the right one "
+                 "listed as not distinguishable from it.")
     return lines
 
 
@@ -142,7 +142,7 @@ def _by_strength(records: Sequence[Record]) -> Table:
             ("Three effects: all named", three, all_named),
             ("Off the list: unexplained", out, off_list_seen),
             ("Effects found: error within 10 % of the noise floor", listed, near),
-            ("Effects found: numbers right", listed, numbers_right)):
+            ("Effects found: parameters right", listed, numbers_right)):
         found = [share(in_class(asked, low, high), holds) for _, low, high in CLASSES]
         found.append(share([record for record in asked if not unseen(record)], holds))
         rows.append((name, *map(_share, found)))
@@ -215,15 +215,15 @@ def _wrong_numbers(records: Sequence[Record]) -> Table:
         off = "; ".join(one.words for one in numbers(record) if not one.right)
         ratio = f"{above(record, 'noise_floor_error'):.3f}" if record["added"] else record["failed"] or ""
         rows.append((record["kind"], f"{record['seed']}", _hidden(record), ratio, off))
-    return Table(("Kind", "Seed", "Hidden (strength)", "Error over noise floor", "Numbers that are off"), rows,
+    return Table(("Kind", "Seed", "Hidden (strength)", "Error over noise floor", "Parameters that are off"), rows,
                  (0, 2, 4))
 
 
 def _unseen(records: Sequence[Record]) -> Table:
     rows = [(record["kind"], f"{record['seed']}", _hidden(record), f"{min(record['left']):.2f}", said(record),
              "right" if right(record) else "wrong") for record in records if unseen(record)]
-    return Table(("Kind", "Seed", "Hidden (strength)", "Left to be seen, over noise", "Said", "Counted"), rows,
-                 (0, 2, 4, 5))
+    heads = ("Kind", "Seed", "Hidden (strength)", "What remains of the effect, over noise", "Said", "Counted")
+    return Table(heads, rows, (0, 2, 4, 5))
 
 
 # --- the matrix -----------------------------------------------------------------------------------------------------
@@ -272,10 +272,10 @@ class Matrix:
 
 
 _MATRIX_LINES = (
-    "Cases that hid one thing, or nothing, and whose distance is right: what was hidden (rows) and what was said "
-    "first (columns). A case off the list counts as unexplained where that was said, whatever else was. *Confused*: "
-    "cases of the row in which another effect was named first and the right one listed as not distinguishable from "
-    "it; they count as right.",)
+    "Cases that hid one effect, or nothing, and whose distance is right: what was hidden (rows) and what was said "
+    "first (columns). A case off the list counts as unexplained where that was said, whatever else was said. "
+    "*Confused*: cases of the row in which another effect was named first and the right one listed as not "
+    "distinguishable from it; they count as right.",)
 
 
 def _row(record: Record) -> str:
