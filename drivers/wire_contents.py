@@ -306,7 +306,7 @@ ADVICE = {
                              "renew its firmware, or have it send other sentences ({expected} expected)",
     (RECEIVER, "receiver_binary"): "it sends {what}, and {expected} expected: switch it to NMEA at this port (RMC and "
                                    "GGA are enough)",
-    (RECEIVER, "text"): "whole lines of text come, so the baud rate is right, but they are no NMEA sentences{shown}; "
+    (RECEIVER, "text"): "whole lines of text come, so the baud rate is right, but they are not NMEA sentences{shown}; "
                         "{expected} expected: switch the receiver to NMEA 0183, and check that this is its port",
     (RECEIVER, "sensor_binary"): _EXCHANGED.format(other="an accelerometer"),
     (RECEIVER, "numbers"): _EXCHANGED.format(other="an accelerometer").replace("{what}", "lines of {what}"),

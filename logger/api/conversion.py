@@ -31,7 +31,7 @@ from logger.store.log.log_reader import LoggedFile, find_logs_in, read_found, sp
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Conversion(CommandResult):
-    """What was written.
+    """The file that ``convert`` wrote.
 
     path             the file
     format           its ending

@@ -166,7 +166,7 @@ class EstimateQuestion(LongQuestion):
 class CalibrateQuestion(LongQuestion):
     """Compute how much a vehicle shakes on known roads: IRI and Gd(n0) per r.m.s. acceleration, comfort per IRI.
 
-    The vehicle's model drives over random roads of IRI 1 to 10 m/km at 10 to 70 mph; it prints one line per speed, with
+    The vehicle's model drives over random roads of IRI 1 to 10 m/km at 10 to 70 mph: one line per speed, with
     the scatter between roads. The result is cached beside the vehicle's file (NAME.calibration.json) or in the user's
     cache, unless the file has an effect of your own.
 
@@ -461,14 +461,14 @@ class RandomRoadQuestion(Question):
     """
 
     iso_class: Annotated[str | None, Option(
-        "class; the road gets the geometric mean of its degrees of roughness", metavar="A-H", read=str.upper,
+        "class of ISO 8608: the road has the geometric mean of its limits of Gd(n0)", metavar="A-H", read=str.upper,
         choices="ABCDEFGH", flag="--class")] = None
     gd_n0_cm3: Annotated[float | None, InPython(
         "degree of roughness Gd(n0), n0 = 0.1 cycles per metre [cm3]", ROUGHNESS)] = None
     iri_m_per_km: Annotated[float | None, Option(
         "IRI; Gd(n0) follows from Eq 4.40", IRI_RANGE,
         "M_PER_KM")] = None
-    length_m: Annotated[float, Option("[m]", LENGTH, "M")] = 1000.0
+    length_m: Annotated[float, Option("length of the road [m]", LENGTH, "M")] = 1000.0
     spacing_m: Annotated[float, InPython("between samples [m]", SPACING)] = 0.05
     seed: Annotated[int, Option("seed of the random road (default: 1)", Range(0, float("inf")), "N")] = 1
     waviness: Annotated[float, InPython("w, the slope of the spectrum", ROAD_WAVINESS)] = 2.0

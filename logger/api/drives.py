@@ -92,8 +92,8 @@ excitation     what moved the wheels of a rig, counted from the first sample; No
 
 
 def read_run(path: Path | str) -> Run:
-    """Read a folder with ``drive.csv`` and, where the road is known, ``profile.csv``, of a rig ``excitation.csv``; or a
-    ``drive.csv`` alone.
+    """Read a folder with ``drive.csv`` and ``profile.csv`` (where the road is known) or, for a rig, ``excitation.csv``;
+    or a ``drive.csv`` alone.
 
     Raises BadInput (``file:line: expected ..., found ...``) for a file that is missing or not what it should be.
 
@@ -167,8 +167,8 @@ def checked_run(run: drive_file.Drive | Path | str, asked: RecordRules) -> tuple
 
 
 def write_run(folder: Path | str, run: Run) -> None:
-    """Write a run as a folder with ``drive.csv`` (ten digits), where its road is known ``profile.csv``, of a rig
-    ``excitation.csv``, and ``run.yaml`` where something is known of the record. OSError if that fails.
+    """Write a run as a folder with ``drive.csv`` (ten digits) and what else is known: ``profile.csv`` or, for a rig,
+    ``excitation.csv``; and ``run.yaml``. OSError if that fails.
 
     >>> write_run(folder / "again", read_run(folder))
     """
@@ -195,7 +195,7 @@ def make_run(
     accel_z_mps2: npt.ArrayLike, speed_mps: npt.ArrayLike, *, rate_hz: float, distance_m: npt.ArrayLike | None = None,
     profile: Profile | None = None, name: str = "run",
 ) -> Run:
-    """A run out of arrays (n,), the first sample at 0 s.
+    """A run from arrays (n,); the first sample is at 0 s.
 
     accel_z_mps2   of the sensor, up positive, gravity removed [m/s2]
     speed_mps      (n,), or one for all samples [m/s]

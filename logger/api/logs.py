@@ -74,7 +74,7 @@ _NUMBERS = tuple(one.name for one in fields(WindowRecord) if one.name not in ("t
 
 
 def read_log(path: Path | str) -> Log:
-    """Read segment logs: one file, or all in a folder at any depth, in order of their writing; open ones too.
+    """Read segment logs: one file, or all in a folder at any depth, in the order of writing; open ones too.
 
     Raises BadInput where there is no log, or none that can be read. Damage is counted, not raised.
 
@@ -103,7 +103,7 @@ def read_log(path: Path | str) -> Log:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Samples(Shown):
-    """What an accelerometer said, m samples.
+    """The m samples of an accelerometer.
 
     t_s           (m,) monotonic time [s]
     accel_mps2    (m, 3) specific force along the sensor's X, Y, Z; gravity is in it [m/s2]

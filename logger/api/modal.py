@@ -313,7 +313,7 @@ def read_channels(path: Path | str, columns: Sequence[str] = ()) -> Channels:
 
 
 def make_channels(samples: Mapping[str, npt.ArrayLike], *, rate_hz: float, start_s: float = 0.0) -> Channels:
-    """A record out of arrays (n,) by the names of their channels.
+    """A record from arrays (n,), by the names of their channels.
 
     rate_hz    samples a second; the first was taken at ``start_s`` [s]
 

@@ -55,7 +55,7 @@ from logger.units import INCH_PER_MILE_M_PER_KM, US_PER_S
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RepeatedDrives(CommandResult):
-    """Cells of road (k,), one for each place and direction, with the mean of all drives over them; NaN: not known.
+    """Pieces of road (k,), one for each place and direction, with the mean of all drives over it; NaN: not known.
 
     drives                            (k,) how many passed each
     iri_m_per_km, iri_std_m_per_km    (k,) mean weighted by the passes' errors, and its standard error, with what is

@@ -83,7 +83,7 @@ class Record(record_file.AccelerationRecord, Shown):
 
 
 def read_record(path: Path | str) -> Record:
-    """Read a CSV record with ``t_s`` and ``accel_z_mps2``, perhaps ``accel_x_mps2`` and ``accel_y_mps2``.
+    """Read a CSV record with ``t_s`` and ``accel_z_mps2``, optionally ``accel_x_mps2`` and ``accel_y_mps2``.
 
     Raises BadInput (``file:line: expected ..., found ...``) for anything else.
 
@@ -95,7 +95,7 @@ def read_record(path: Path | str) -> Record:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comfort(CommandResult):
-    """Values of the vertical axis; those of the others and of health are in ``as_json``.
+    """Comfort values of the vertical axis; ``as_json`` has those of the other axes and of health.
 
     weighting       that it was weighted by
     a_w_mps2        weighted r.m.s. acceleration [m/s2]

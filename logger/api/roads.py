@@ -172,7 +172,7 @@ def iri(question: IriQuestion) -> Iri:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class RoadClass(CommandResult):
-    """What kind of road a profile is, by its (left) track; of two, the right one is in ``as_json``.
+    """The class of a profile, by its left track; ``as_json`` has the right one as well.
 
     road_class       A to H (ISO 8608)
     gd_n0_cm3        degree of roughness Gd(n0) [cm3], and ``gd_n0_std_cm3`` its standard error

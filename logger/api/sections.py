@@ -40,7 +40,7 @@ from logger.units import FOOT_M, MILE_M
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Sections(CommandResult):
-    """Sections of the drives of some logs, k of all of them, in the order driven; NaN: not known.
+    """The k sections of all drives of some logs, in the order driven; NaN: not known.
 
     length_m                      of a section; the last one of a drive is cut short [m]
     drive                         (k,) number of the drive, in the order read, from 0

@@ -31,12 +31,12 @@ Runs = Union["Drive", Path, str, Sequence[Union["Drive", Path, str]]]
 VehicleName = Annotated[Vehicle, Option(
     "a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name); in Python a model as well",
     metavar="NAME|FILE", read=str)]
-Anyway = Annotated[bool, Option("go on although a run seems to be of another road or car, or in other units")]
+Anyway = Annotated[bool, Option("go on even if a run seems to be of another road or car, or in other units")]
 TrackedRuns = Annotated[Runs, Argument(
     "folder with drive.csv and profile.csv (of a rig: excitation.csv)", metavar="RUN", read=Path, many=list)]
 Tolerance = Annotated[float | str | None, Option(
-    "how far the vehicle's masses, springs and dampers may be off where its file does not say, as a share (default: "
-    f"{USUAL_TOLERANCE:g}; the standard deviation is 0.625 of it, and of lengths 0.02). {UNKNOWN}: no parameter is "
+    "share by which masses, springs and dampers may be off, where the vehicle's file does not say (default: "
+    f"{USUAL_TOLERANCE:g}; their standard deviation is 0.625 of that; lengths have 0.02). {UNKNOWN}: no parameter is "
     "known",
     metavar=f"SHARE|{UNKNOWN}", read=word_or_number(UNKNOWN, TOLERANCE),
     check=check_word_or_number(UNKNOWN, TOLERANCE))]

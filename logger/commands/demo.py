@@ -2,8 +2,8 @@
 
 The drive is simulated: a half car over generated roads, recorded as the bytes that a BMA220 and a GPS would have
 sent. It goes through recorded buses into the real drivers and the real service. --lab finds what a car has that its
-model lacks; --field does so from recorded bytes, and shows what it does to the IRI. --car learns a car that nobody
-measured from four drives. --years compares two years of a road.
+model lacks; --field does so from recorded bytes, and shows how the IRI improves. --car learns an unmeasured car
+from four drives. --years compares two years of a road.
 
   ridelog demo
   ridelog demo --lab

@@ -53,8 +53,8 @@ class Finding:
 
 
 class NotIdentifiable(CheckFailed):
-    """The data do not determine what was asked. ``findings`` say what, and its text says it in words; ``error_before``
-    that of the model where every free number starts, None: not known."""
+    """The data do not determine what was asked. ``findings`` say what, and the text says it in words;
+    ``error_before`` is the model's error at the start values, None: not known."""
 
     def __init__(self, findings: Sequence[Finding], error_before: float | None = None) -> None:
         super().__init__("the data cannot tell: " + " ".join(finding.words for finding in findings))

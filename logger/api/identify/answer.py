@@ -88,7 +88,7 @@ _PLACES_OFF_M, _SCALE_OFF = 10.0, 0.01
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Identification(CommandResult):
-    """Numbers that were found.
+    """Parameters that ``identify`` fitted.
 
     fit            with covariance and correlation, of measured roads with the whitened residuals as well
     model          with the numbers

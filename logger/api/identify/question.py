@@ -79,7 +79,7 @@ class IdentifyQuestion(question.LongQuestion):
     _: KW_ONLY
     obstacles: Annotated[Mapping[str, Mapping[str, float]] | None, question.Option(
         "what lies on the road [m]; may repeat. bump: height_m, width_m; step, up or with a negative height down: "
-        "height_m. Without start_m, identify searches for it; --free takes its parameters as bump.height_m ... In "
+        "height_m. Without start_m, identify searches for it; --free takes its parameters as bump.height_m. In "
         "Python: "
         '{"bump": {"height_m": 0.1, "width_m": 3.0}}', metavar="NAME:PARAM=VALUE,...", read=_obstacle, many=dict,
         flag="--obstacle")] = None
@@ -107,4 +107,4 @@ class IdentifyQuestion(question.LongQuestion):
 
 VERB = question.Verb(IdentifyQuestion, "logger.api.identify.answer:identify", (question.Out(
     "write the vehicle with the fitted values; FILE.html, .png, .svg, .pdf: pictures of the residual and of correlated "
-    "numbers; may repeat", metavar="FILE", others=("*",)),), "logger.api.identify.answer:refusal_json")
+    "parameters; may repeat", metavar="FILE", others=("*",)),), "logger.api.identify.answer:refusal_json")

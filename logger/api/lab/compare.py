@@ -97,7 +97,7 @@ def comparison_of(found: LabComparison) -> Comparison:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class AddedEffect(CommandResult):
-    """A model with one more effect, fitted with the car's numbers on all of the runs.
+    """A model with one more effect, fitted to all runs together with the car's parameters.
 
     found               all that the lab found
     effect              its name, ``parameters`` and ``standard_errors`` by name; of several added together "A+B", with

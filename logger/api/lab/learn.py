@@ -45,7 +45,7 @@ class LearnedModel:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LearnedLaw(CommandResult):
-    """A law out of the data, or why there is none.
+    """A law learnt from the data, or why there is none.
 
     found                all that was learned
     vehicle              name of the one that it is of

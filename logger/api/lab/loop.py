@@ -110,7 +110,7 @@ class Story:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LabStory(CommandResult):
-    """What the loop came to.
+    """What the lab's whole loop found.
 
     story                all of it, as the lab has it
     model                with all that was added, as the last file has it

@@ -45,7 +45,7 @@ from logger.store.formats import drive_file, profile_file, vehicle_file
 
 @dataclass(frozen=True)
 class NextDrive:
-    """A drive that may come next.
+    """A further drive that ``plan`` proposes.
 
     do            in words
     gains         deviations by which effects would be separated better from what is most like them
@@ -59,8 +59,8 @@ class NextDrive:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Plan(CommandResult):
-    """What drives could show of effects at their usual strength, in standard deviations, the car's numbers and the
-    distances being free within their tolerance.
+    """Which effects of usual strength drives could show, in standard deviations, with the car's parameters and the
+    distances free within their tolerance.
 
     found            all that the lab says, of the ``vehicle`` of this name
     detectability    by how much each effect stands out, by name

@@ -150,9 +150,9 @@ class LearnQuestion(LabQuestion):
       ridelog learn --vehicle mycar.yaml --out law.py --out law.html run1 run2
 
     First learn tries every known effect, as ridelog diagnose does. If these explain the residual, or nothing is
-    missing, it learns and writes nothing. Otherwise it tries families of laws (forces that depend on travel, rate or
-    tire deflection, hysteresis, a mass on a spring, ...) by the same evidence, which penalises each parameter. It
-    writes the law as an effect of your own: one Python file that compare, simulate, diagnose --effect-file and
+    missing, it learns nothing and writes no file. Otherwise it tries families of laws (forces that depend on travel,
+    rate or tire deflection, hysteresis, a mass on a spring, ...) by the same evidence, which penalises each parameter.
+    It writes the law as an effect of your own: one Python file that compare, simulate, diagnose --effect-file and
     add-effect read. It takes minutes and needs pip install 'ridelog[lab]'. Then:
 
       ridelog add-effect ./law.py --vehicle mycar.yaml --out with-law.yaml run1 run2

@@ -45,7 +45,7 @@ BIAS_SIGMA = 2.0
 
 @dataclass(frozen=True)
 class Number:
-    """A number of the car: nominal, refitted without the added effects, and with them; with standard errors, which
+    """A parameter of the car: nominal, refitted without the added effects, and with them; with standard errors, which
     include the prior."""
 
     name: str

@@ -220,7 +220,7 @@ _HEADER = f"a header with {{}}[,{','.join(PLACE)}][,{USABLE}], each once"
 
 @dataclass(frozen=True, eq=False)
 class Drive:
-    """What a recorder wrote down while it drove, arrays (n,).
+    """What was recorded during a drive, as arrays (n,).
 
     path           of the file, or of a run's folder; of a simulated drive its name
     rate_hz        samples a second

@@ -148,7 +148,7 @@ COLUMNS = (
     _count("segment", "number of the window since the service started"),
     LogColumn("t_utc", "utc_us", write_utc, _read_utc, "start of the window, UTC from the GPS"),
     LogColumn("t_s", "t_us", _write_seconds, _read_seconds, "start of the window, seconds of the monotonic clock"),
-    _number("distance_start_m", 3, "travelled distance with known speed, at the window's start"),
+    _number("distance_start_m", 3, "distance travelled at known speed, at the window's start"),
     _number("distance_end_m", 3, "the same at its end"),
     _number("lat_deg", 7, "latitude of its middle", 90.0),
     _number("lon_deg", 7, "longitude of its middle", 180.0),

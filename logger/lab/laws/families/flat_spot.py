@@ -31,7 +31,7 @@ _SHARE = 0.01  # of what its stiffness answers to its length: tried
 
 
 class FlatSpot(Family):
-    title = "a flat spot of a tire"
+    title = "a flat spot on a tire"
     source = ("P. W. A. Zegelaar, The Dynamic Response of Tyres to Brake Torque Variations and Road Unevennesses "
               "(Delft, 1998)")
     signature = "short blows, once in each turn of a wheel, whatever the speed"
@@ -53,7 +53,7 @@ class FlatSpot(Family):
         return found
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
-        what, sign, how = (("a flat spot of a tire", 1.0, "less") if found.values["force_n"] > 0
+        what, sign, how = (("a flat spot on a tire", 1.0, "less") if found.values["force_n"] > 0
                            else ("a bump on a tire", -1.0, "more"))
         force = say("force_n", sign, "N").replace("± -", "± ")
         begins = BEGINS * draft.variant.endswith(EACH)
