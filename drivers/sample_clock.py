@@ -99,7 +99,7 @@ Times = npt.NDArray[np.int64]
 NO_TIME = -(2**63)  # Stands for the time of a sample that cannot be dated
 
 
-class _Point(NamedTuple):
+class _ClockPoint(NamedTuple):
     """A lowest arrival: how many samples came before it, how many of those lost were noticed, when it came [us]."""
 
     number: int
@@ -184,8 +184,8 @@ class SampleClock:
         self._held: Times = np.empty(0, dtype=np.int64)
         self._last_us = -(2**62)
         self.rates_hz = (rate_hz, rate_hz)
-        self._points: list[_Point] = []
-        self._pieces: list[_Point] = []
+        self._points: list[_ClockPoint] = []
+        self._pieces: list[_ClockPoint] = []
         self._number = 0
         self._finding = True
         self._following = False
@@ -342,7 +342,7 @@ class SampleClock:
             self.refused_hz = 1e6 / slope_us
             self._steady_needed = steady_needed if is_steady and steady_needed > 0 else self.STEADY
 
-    def _comb(self, points: list[_Point], slope_us: float) -> float | None:
+    def _comb(self, points: list[_ClockPoint], slope_us: float) -> float | None:
         """The period [us] of a sampler of which samples are lost, where the arrivals show it. (125 Hz with 1 in 25
         lost, and 120 Hz through an adapter with a timer of 8 ms, arrive alike: the rows of both are flagged.)"""
         if not self.SLOWEST * self._nominal_us <= slope_us <= self._nominal_us / self.SLOWEST**2:
@@ -350,7 +350,7 @@ class SampleClock:
         period_us = self._sampled_us(points, slope_us)
         return None if period_us is None or period_us > self._nominal_us / self.SLOWEST else period_us
 
-    def _sampled_us(self, points: list[_Point], slope_us: float) -> float | None:
+    def _sampled_us(self, points: list[_ClockPoint], slope_us: float) -> float | None:
         """The period [us] by the comb of the arrivals; None where they lie on a line, or show none."""
         above_us = [point.arrival_us - slope_us * point.number for point in points]
         if max(above_us) - min(above_us) < 0.5 * slope_us:  # where a sample is lost, they leave it by a period
@@ -377,7 +377,7 @@ class SampleClock:
     def _take_period(self, period_us: float) -> None:
         self._period_us = min(max(period_us, self._shortest_us), self._longest_us)
 
-    def _envelope(self, arrivals_us: Times) -> list[_Point]:
+    def _envelope(self, arrivals_us: Times) -> list[_ClockPoint]:
         """The lowest arrivals of some pieces of time."""
         numbers = np.arange(len(arrivals_us), dtype=np.float64)
         span_us = float(arrivals_us[-1] - arrivals_us[0])
@@ -389,7 +389,7 @@ class SampleClock:
         piece = ((arrivals_us - arrivals_us[0]) * self.PIECES / (span_us + 1)).astype(np.int64)
         lowest = [np.flatnonzero(piece == k) for k in range(self.PIECES)]
         found = [int(inside[np.argmin(above_us[inside])]) for inside in lowest if len(inside)]
-        return [_Point(number, 0, int(arrivals_us[number])) for number in found]
+        return [_ClockPoint(number, 0, int(arrivals_us[number])) for number in found]
 
     def _settle(self, arrivals_us: Times) -> Times:
         """Start a line below all arrivals."""
@@ -401,7 +401,7 @@ class SampleClock:
         run_us = self._period_us * np.arange(len(arrivals_us), dtype=np.float64)
         lowest = int(np.argmin(arrivals_us - run_us))
         start_us = float(arrivals_us[lowest] - run_us[lowest])
-        self._points = [_Point(lowest, self.lost, int(arrivals_us[lowest]))]
+        self._points = [_ClockPoint(lowest, self.lost, int(arrivals_us[lowest]))]
         self._pieces = []
         self._number = len(arrivals_us)
         self._following = True
@@ -413,7 +413,7 @@ class SampleClock:
         self._step_us = step_us
         self._index = 0
         self._pulled_us = 0.0
-        self._lowest_of_pieces: dict[int, tuple[float, _Point]] = {}
+        self._lowest_of_pieces: dict[int, tuple[float, _ClockPoint]] = {}
 
     def _follow(self, arrivals_us: Times) -> Times:
         """Times of samples of this block that belong to the line."""
@@ -425,7 +425,7 @@ class SampleClock:
             lowest = first + int(np.argmin(above_us[first:end]))
             before_us, _ = self._lowest_of_pieces.get(int(pieces[first]), (np.inf, None))
             if above_us[lowest] < before_us:
-                point = _Point(self._number + self._index + lowest, self.lost, int(arrivals_us[lowest]))
+                point = _ClockPoint(self._number + self._index + lowest, self.lost, int(arrivals_us[lowest]))
                 self._lowest_of_pieces[int(pieces[first])] = float(above_us[lowest]), point
         pulled_us: npt.NDArray[np.float64] = np.minimum.accumulate(np.minimum(above_us, self._pulled_us))
         self._pulled_us = float(pulled_us[-1])
@@ -514,7 +514,7 @@ class SampleClock:
         return times
 
 
-def _slope(points: list[_Point], with_lost: bool) -> tuple[float, float]:
+def _slope(points: list[_ClockPoint], with_lost: bool) -> tuple[float, float]:
     """Median of the slopes between points [us per sample], and how far the points lie about that line [us]; the latest
     quarter is left out: a link that stalls delays some."""
     counts = [point.number + point.lost * with_lost for point in points]

@@ -47,7 +47,7 @@ from drivers.wire_profiles import (
 )
 
 
-class _Found(NamedTuple):
+class _Decoded(NamedTuple):
     """Decoded samples and where they began in the stream: offsets (n,), m/s2 (n, 3), clipped (n,), good (n,)."""
 
     after_loss: bool
@@ -66,10 +66,10 @@ class _FrameReader:
         self.framer = FixedFramer(layout.length_bytes, layout.plausible, layout.oriented if set_by_gravity else None,
                                   layout.sync)
 
-    def read(self, data: bytes) -> list[_Found]:
+    def read(self, data: bytes) -> list[_Decoded]:
         return [self._samples(frame) for frame in self.framer.feed(data)]
 
-    def _samples(self, run: Frame) -> _Found:
+    def _samples(self, run: Frame) -> _Decoded:
         layout = self._layout
         frames = np.frombuffer(run.data, dtype=np.uint8).reshape(-1, layout.length_bytes)
         counts = layout.counts(frames)
@@ -79,7 +79,7 @@ class _FrameReader:
         accel_mps2: npt.NDArray[np.float64] = (counts - zero_raw) * scale_mps2
         offsets = run.start + layout.length_bytes * np.arange(len(frames), dtype=np.int64)
         clipped = np.asarray(((counts <= low) | (counts >= high)).any(axis=1))
-        return _Found(run.after_loss, offsets, accel_mps2, clipped, layout.plausible(frames))
+        return _Decoded(run.after_loss, offsets, accel_mps2, clipped, layout.plausible(frames))
 
 
 _DECIMAL = rb" *([+-]?(?:\d{1,6}(?:\.\d{0,12})?|\.\d{1,12})) *"
@@ -94,15 +94,15 @@ class _LineReader:
         self._layout = layout
         self.framer = LineFramer()
 
-    def read(self, data: bytes) -> list[_Found]:
+    def read(self, data: bytes) -> list[_Decoded]:
         frames = self.framer.feed(data)
         cuts = [0, *(k for k, frame in enumerate(frames) if k and frame.after_loss), len(frames)]
         return [self._samples(frames[a:b]) for a, b in pairwise(cuts) if a < b]
 
-    def _samples(self, lines: list[Frame]) -> _Found:
+    def _samples(self, lines: list[Frame]) -> _Decoded:
         values = np.array([_triple(line.data, self._layout) for line in lines], dtype=np.float64)
         largest = np.abs(values).max(axis=1)
-        return _Found(lines[0].after_loss, np.array([line.start for line in lines], dtype=np.int64),
+        return _Decoded(lines[0].after_loss, np.array([line.start for line in lines], dtype=np.int64),
                       values * self._layout.unit_mps2, largest >= self._layout.range_units,
                       largest <= 2 * self._layout.range_units)
 

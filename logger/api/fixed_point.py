@@ -66,7 +66,7 @@ def written(question: FixedPointQuestion) -> "CommandResult":
 
 
 @dataclass(frozen=True)
-class _Header:
+class _FilterHeader:
     name: str
     title: str
     unit: str
@@ -102,7 +102,7 @@ class _Header:
                 f"  one count is {cascade.input_step:.4g} {self.unit} in, {cascade.output_step:.4g} {self.unit} out")
 
 
-def _weighting(question: FixedPointQuestion) -> _Header:
+def _weighting(question: FixedPointQuestion) -> _FilterHeader:
     from logger.api.rides import weighting_named
     from logger.dsp.fixed_point import FULL_SCALE_MPS2, fixed_cascade
     from logger.dsp.weightings.weighting import DELAY_SAMPLES
@@ -113,7 +113,7 @@ def _weighting(question: FixedPointQuestion) -> _Header:
         cascade = fixed_cascade(_sections(weighting, question.rate_hz), FULL_SCALE_MPS2, data_bits=question.data_bits)
     except ValueError as error:
         raise question.wrong("rate_hz", f" {question.rate_hz}: {error}") from None
-    return _Header(
+    return _FilterHeader(
         f"ridelog_{weighting.name}",
         f"Weighting {weighting.name.capitalize()} at {question.rate_hz} Hz for inputs within "
         f"+-{FULL_SCALE_MPS2 / STANDARD_GRAVITY_MPS2:g} g",
@@ -132,12 +132,12 @@ def _sections(weighting: "Weighting", rate_hz: int) -> "Sections":
     return design_sections(weighting, rate_hz)
 
 
-def _golden_car(question: FixedPointQuestion) -> _Header:
+def _golden_car(question: FixedPointQuestion) -> _FilterHeader:
     from logger.dsp.fixed_point import FULL_SCALE_SLOPE, fixed_cascade
     from logger.roads.iri import golden_car_sections
 
     cascade = fixed_cascade(golden_car_sections(_SPACING_M), FULL_SCALE_SLOPE, data_bits=question.data_bits)
-    return _Header(
+    return _FilterHeader(
         "ridelog_golden_car",
         f"Golden Car of the IRI, 80 km/h, a slope every {_SPACING_M:g} m, for slopes within +-{FULL_SCALE_SLOPE:g}",
         "m/m",

@@ -193,7 +193,7 @@ def spread_starts(free: Sequence[Free], count: int) -> list[dict[str, float]]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Point:
+class _ResidualsAt:
     """A place, and what the residuals are there: white (N,), and as they are, per record."""
 
     x: Array
@@ -251,13 +251,13 @@ class _FitProblem:
                 raise ValueError("expected every start between its bounds")
         return starts
 
-    def at(self, x: Array, noise: Whitening) -> _Point:
+    def at(self, x: Array, noise: Whitening) -> _ResidualsAt:
         """The residuals at a place, weighed by a noise model."""
         predictions = self._filtered(self.model.predict(self.coordinates.values(x)))
         plain = [seen - one for seen, one in zip(self.observed, predictions, strict=True)]
         white = noise(plain)
         cost = 0.5 * float(white @ white + self.pull(x) @ (self.mean - x))
-        return _Point(x, cost, white, plain)
+        return _ResidualsAt(x, cost, white, plain)
 
     def linearised(self, x: Array) -> _Linearised:
         """Predictions and derivatives at a place; of the one that was asked for last they are known."""
@@ -286,11 +286,11 @@ class _FitProblem:
 # --- descent ---
 
 
-def _descend(problem: _FitProblem, start: Array, noise: Whitening) -> Minimum[_Point]:
+def _descend(problem: _FitProblem, start: Array, noise: Whitening) -> Minimum[_ResidualsAt]:
     """The nearest minimum of the sum of squares."""
     slopes = np.empty((0, 0))
 
-    def normal_equations(x: Array, point: _Point, fresh: bool) -> tuple[Array, Array]:
+    def normal_equations(x: Array, point: _ResidualsAt, fresh: bool) -> tuple[Array, Array]:
         nonlocal slopes
         if fresh:
             slopes = noise(problem.linearised(x).slopes)
@@ -303,7 +303,7 @@ def _descend(problem: _FitProblem, start: Array, noise: Whitening) -> Minimum[_P
                     most_rounds=_MOST_STEPS, low=problem.low, high=problem.high, longest_step=_LONGEST_STEP)
 
 
-def _innovations(problem: _FitProblem, point: _Point) -> tuple[Whitening, _Point, int, bool]:
+def _innovations(problem: _FitProblem, point: _ResidualsAt) -> tuple[Whitening, _ResidualsAt, int, bool]:
     """Noise model and numbers in turn, until neither moves: (noise, place, steps, whether they came to rest)."""
     kinds, steps = list(problem.options.noise), 0
     for _ in range(_MOST_NOISE_ROUNDS):
@@ -326,7 +326,7 @@ def _innovations(problem: _FitProblem, point: _Point) -> tuple[Whitening, _Point
 # --- the result ---
 
 
-def _result(problem: _FitProblem, point: _Point, noise: Whitening, iterations: int, settled: bool,
+def _result(problem: _FitProblem, point: _ResidualsAt, noise: Whitening, iterations: int, settled: bool,
             ends: Array) -> Fit:
     names = [one.name for one in problem.free]
     slopes = noise(problem.linearised(point.x).slopes)
@@ -357,7 +357,7 @@ def _result(problem: _FitProblem, point: _Point, noise: Whitening, iterations: i
                prior=(problem.precision, problem.pull(point.x)))
 
 
-def _covariance(problem: _FitProblem, point: _Point, slopes: Array) -> Array:
+def _covariance(problem: _FitProblem, point: _ResidualsAt, slopes: Array) -> Array:
     """Covariance (p, p) of the coordinates, from the information matrix and the scatter of the white residuals."""
     count, p = slopes.shape
     variance = float(point.white @ point.white) / max(count - p, 1)

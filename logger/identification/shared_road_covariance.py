@@ -84,7 +84,7 @@ def with_common_roughness(model: DriveModel, fit: Fit) -> CommonRoughness:
 
 
 @dataclass(frozen=True, eq=False)
-class _Drive:
+class _Stretch:
     """The stretch of a drive that is looked at: true way from the obstacle [m], whitened residuals (n,), whitened
     derivatives (n, p), what whitens, and the sensor's response (k,) to waves of the road."""
 
@@ -102,7 +102,7 @@ def may_have_common(model: DriveModel) -> bool:
     return 1 < len(alike) == len(model.records) and all(alike)
 
 
-def _drive(model: DriveModel, fit: Fit, values: Array, run: int, slopes: Array) -> _Drive:
+def _drive(model: DriveModel, fit: Fit, values: Array, run: int, slopes: Array) -> _Stretch:
     record, road = model.records[run], model.road_with(values, run)
     start_m = min((one.start_m for one in road.obstacles.values()), default=0.0)
     way_m = fit.low_pass.apply(record.distance_m[record.first:]) / road.speed_scale - start_m
@@ -112,10 +112,10 @@ def _drive(model: DriveModel, fit: Fit, values: Array, run: int, slopes: Array) 
     f_hz = np.maximum(_waves_cpm() * speed_mps, 1e-3)
     response = model.response(values, f_hz, speed_mps)
     gain = recorder_gain(f_hz / record.rate_hz) * fit.low_pass.gain(np.minimum(f_hz, record.rate_hz / 2))
-    return _Drive(way_m[stretch], fit.white[run][stretch], slopes[stretch], fit.noise.whiteners[run], response * gain)
+    return _Stretch(way_m[stretch], fit.white[run][stretch], slopes[stretch], fit.noise.whiteners[run], response * gain)
 
 
-def _common(one: _Drive, other: _Drive) -> Array:
+def _common(one: _Stretch, other: _Stretch) -> Array:
     """What a road of Gd(n0) = 1 cm3 gives the whitened residuals of two drives in common: covariances (n, m)."""
     n = _waves_cpm()
     psd = np.append(0.0, displacement_psd(n[1:], 1.0))

@@ -62,19 +62,30 @@ LAID_BY_THE_ROAD = ("ridelog extract has already shifted these runs to fit the r
 class CandidateEffect:
     """An effect that was tried.
 
-    error                  on stretches that no fit saw, of the refitted model with it alone
+    one                    the effect with its values
+    error                  of the refitted model with it alone, on stretches that no fit saw; without a profile, of all
+                           drives, each predicted by the others
     p_value                probability, at most, that noise alone gains as much with any of the candidates
-    gain, held_out_gain    of minus twice the log of the evidence, and of the likelihood on held-out stretches
+    gain, held_out_gain    of minus twice the log of the evidence, and of the likelihood on held-out stretches; None:
+                           not known
     confused_with          effects that explain the same as well
+    fitted                 with the car's numbers; else it was added at the best strength of its score test
+    stands_in              whether it bends the laws of the car, so that linear ones stood in for it
     """
 
-    effect: Effect
-    values: Mapping[str, float]
+    one: Chosen
     error: float
     p_value: float
     gain: float
-    held_out_gain: float
-    confused_with: tuple[str, ...]
+    held_out_gain: float | None = None
+    confused_with: tuple[str, ...] = ()
+    fitted: bool = True
+    stands_in: bool = False
+
+    @property
+    def effect(self) -> Effect:
+        """The effect itself."""
+        return self.one.effect
 
 
 @dataclass(frozen=True, eq=False)
@@ -450,18 +461,16 @@ def _steps(selection: Selection, nominal_error: float) -> tuple[ErrorStep, ...]:
 def _candidates(selection: Selection, after: State, count: int) -> tuple[tuple[CandidateEffect, ...], tuple[str, ...]]:
     """The missing effects, then the others that are better than the refitted model, the least likely by chance first,
     each with its error on top of that model; and the names of those that are no better."""
-    values = {one.effect.name: one.values for one in after.effects}
-    effects = {one.effect.name: one.effect for one in after.effects}
+    ends = {one.effect.name: Chosen(one.effect, one.values) for one in after.effects}
     before, freedom, first = selection.before.hold_out, selection.before.posterior.freedom, selection.first
     tried = [_of_fit(one, before, count, first.fits) for one in first.fits]
     tried += [_of_promise(selection.before, one, before, count) for one in first.unfitted]
     alone, last, found = {one.effect.name: one for one in tried}, selection.now.hold_out, []
     for name, gain in selection.gains.items():
-        by_chance = chance_of([Chosen(effects[name], values[name])], gain, freedom, count)
+        by_chance = chance_of([ends[name]], gain, freedom, count)
         error, held_out = ((alone[name].error, alone[name].held_out_gain) if name in alone else
                            (last.error, before.deviance - last.deviance))
-        found.append(CandidateEffect(effects[name], values[name], error, by_chance, gain, held_out,
-                                     selection.rivals.get(name, ())))
+        found.append(CandidateEffect(ends[name], error, by_chance, gain, held_out, selection.rivals.get(name, ())))
     others = [one for one in tried if one.effect.name not in selection.gains]
     better = [one for one in others if one.gain > 0 and one.error < before.error]
     return ((*found, *sorted(better, key=lambda one: (one.p_value, -one.gain))),
@@ -474,8 +483,7 @@ def _of_fit(one: CandidateFit, before: HoldOut, count: int, fits: Sequence[Candi
     p_value = chance_of([one.chosen], one.gain, one.found.posterior.freedom, count)
     rivals = tuple(other.effect.name for other in fits
                    if other is not one and abs(other.gain - one.gain) < INDISTINGUISHABLE and p_value < FALSE_ALARM)
-    return CandidateEffect(one.effect, one.chosen.values, there.error, p_value, one.gain,
-                           before.deviance - there.deviance, rivals)
+    return CandidateEffect(one.chosen, there.error, p_value, one.gain, before.deviance - there.deviance, rivals)
 
 
 def _of_promise(base: Baseline, one: Screened, before: HoldOut, count: int) -> CandidateEffect:
@@ -484,5 +492,4 @@ def _of_promise(base: Baseline, one: Screened, before: HoldOut, count: int) -> C
     there = cross_validate(base.linear, [change[None] for change in trial.change()])
     gain = trial.gain - len(free_parameters_of([trial.one])) * float(np.log(base.posterior.freedom))
     by_chance = chance_of([trial.one], gain, base.posterior.freedom, count)
-    return CandidateEffect(one.effect, trial.one.values, there.error, by_chance, gain,
-                           before.deviance - there.deviance, ())
+    return CandidateEffect(trial.one, there.error, by_chance, gain, before.deviance - there.deviance, fitted=False)

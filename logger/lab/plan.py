@@ -492,7 +492,7 @@ class LinearisedDrives:
 
 
 @dataclass(frozen=True, eq=False)
-class _Fit:
+class _Refit:
     """The fitted car without the effect.
 
     logs         logarithms of its numbers (p,)
@@ -515,11 +515,11 @@ def refitted_gain(there: Sequence[LinearisedDrives], changes: Sequence[Sequence[
     """
     start, still = there[0].linear.state.logs, [[np.zeros_like(k) for k in one.linear.state.record] for one in there]
     unmoved = sum(_deviance(one, some, k) for one, some, k in zip(there, changes, still, strict=True))
-    return min(unmoved, _moved_gain(there, changes, precision, _Fit(start, still, list(map(list, changes)), np.inf)))
+    return min(unmoved, _moved_gain(there, changes, precision, _Refit(start, still, list(map(list, changes)), np.inf)))
 
 
 def _moved_gain(there: Sequence[LinearisedDrives], changes: Sequence[Sequence[Array]], precision: Array,
-                now: _Fit) -> float:
+                now: _Refit) -> float:
     """Gain over the best fit that Gauss-Newton steps come to: they minimise squares by the levels of the noise, and
     where a change is far above these a car that did not move may be more likely."""
     slopes = list(there)
@@ -535,7 +535,7 @@ def _moved_gain(there: Sequence[LinearisedDrives], changes: Sequence[Sequence[Ar
 
 
 def _fit_chord(there: Sequence[LinearisedDrives], slopes: Sequence[LinearisedDrives],
-               changes: Sequence[Sequence[Array]], precision: Array, now: _Fit) -> tuple[_Fit, bool]:
+               changes: Sequence[Sequence[Array]], precision: Array, now: _Refit) -> tuple[_Refit, bool]:
     """The best of some steps with the same derivatives, and whether these hold."""
     models, start = [one.linear for one in slopes], there[0].linear.state.logs
     information = np.diag(precision) + sum(
@@ -549,7 +549,7 @@ def _fit_chord(there: Sequence[LinearisedDrives], slopes: Sequence[LinearisedDri
             models, now.residuals, now.moved, strict=True)]
         logs = now.logs + step
         residuals = [_residuals(one, some, logs, k) for one, some, k in zip(there, changes, moved, strict=True)]
-        now = _Fit(logs, moved, residuals, float(precision @ (logs - start) ** 2) + sum(
+        now = _Refit(logs, moved, residuals, float(precision @ (logs - start) ** 2) + sum(
             _deviance(one, some, k) for one, some, k in zip(there, residuals, moved, strict=True)))
         if not now.gain < (1 - _SMALL) * best.gain:
             best = min(now, best, key=lambda one: one.gain)
@@ -558,7 +558,7 @@ def _fit_chord(there: Sequence[LinearisedDrives], slopes: Sequence[LinearisedDri
     return best, _squares(models, best, precision, start)[0] < _KEPT * predicted
 
 
-def _squares(models: Sequence[LinearModel], now: _Fit, precision: Array, start: Array) -> tuple[float, Array]:
+def _squares(models: Sequence[LinearModel], now: _Refit, precision: Array, start: Array) -> tuple[float, Array]:
     """Sum of squares of the residuals and of the prior, and half of its negative gradient (p,)."""
     squares, gradient = float(precision @ (now.logs - start) ** 2), -precision * (now.logs - start)
     for one, residuals, moved in zip(models, now.residuals, now.moved, strict=True):

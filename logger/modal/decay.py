@@ -51,7 +51,7 @@ _MOST_DAMPING = 0.95
 
 
 @dataclass(frozen=True)
-class _Fit:
+class _Modes:
     """Poles s (m,), amplitudes (2 m + 1, channels) of cos, sin and the offset, the residual (samples, channels)."""
 
     poles: Complex
@@ -101,7 +101,7 @@ def _basis(poles: Complex, count: int, rate_hz: float) -> Array:
     return np.ascontiguousarray(waves.reshape(near * len(far), len(poles))[:count]).view(np.float64)
 
 
-def _solve(samples: Array, poles: Complex, rate_hz: float) -> _Fit:
+def _solve(samples: Array, poles: Complex, rate_hz: float) -> _Modes:
     """Amplitudes for given poles."""
     count = len(samples)
     basis = np.hstack([_basis(poles, count, rate_hz), np.ones((count, 1))])
@@ -111,10 +111,10 @@ def _solve(samples: Array, poles: Complex, rate_hz: float) -> _Fit:
     inverse = np.linalg.pinv(r)
     noise = (residual**2).sum(axis=0) / max(1, count - len(r))
     noise = np.maximum(noise, 1e-24 * (samples**2).mean(axis=0) + 1e-300)
-    return _Fit(poles, inverse @ seen, residual, q, noise, (inverse @ inverse.T)[:-1, :-1])
+    return _Modes(poles, inverse @ seen, residual, q, noise, (inverse @ inverse.T)[:-1, :-1])
 
 
-def _normal_equations(fit: _Fit, rate_hz: float) -> tuple[Array, Array]:
+def _normal_equations(fit: _Modes, rate_hz: float) -> tuple[Array, Array]:
     """Information (2 m, 2 m) about Re s, Im s of every pole, amplitudes unknown, and the gradient (2 m,)."""
     count, m = len(fit.residual), len(fit.poles)
     slope = _basis(fit.poles, count, rate_hz) * (np.arange(count) / rate_hz)[:, None]
@@ -131,7 +131,7 @@ def _normal_equations(fit: _Fit, rate_hz: float) -> tuple[Array, Array]:
     return np.asarray(information, dtype=np.float64), np.einsum("aic,ic->a", weighted, pull)
 
 
-def _refit(fit: _Fit, samples: Array, rate_hz: float) -> _Fit:
+def _refit(fit: _Modes, samples: Array, rate_hz: float) -> _Modes:
     """Gauss-Newton on the poles, each step shortened until it helps."""
     most_steps = 60
     for _ in range(most_steps):
@@ -154,7 +154,7 @@ def _refit(fit: _Fit, samples: Array, rate_hz: float) -> _Fit:
     return fit
 
 
-def _significance(fit: _Fit, rate_hz: float) -> Array:
+def _significance(fit: _Modes, rate_hz: float) -> Array:
     """Chi-squared (m,) that each mode explains, against the noise around its frequency and while it lasts."""
     loud, freedom = _loudness(fit, rate_hz), _freedom(fit, fit.poles, rate_hz)
     found = np.empty(len(fit.poles))
@@ -167,13 +167,13 @@ def _significance(fit: _Fit, rate_hz: float) -> Array:
     return found
 
 
-def _freedom(fit: _Fit, poles: Complex, rate_hz: float) -> Array:
+def _freedom(fit: _Modes, poles: Complex, rate_hz: float) -> Array:
     """How many samples (m,) the envelope of each pole counts, those that the fit took for itself left out."""
     envelope, left = _envelope(fit, poles, rate_hz)
     return np.asarray(np.maximum((envelope @ left) ** 2 / (envelope**2 @ left + 1e-300), 1.0))
 
 
-def _envelope(fit: _Fit, poles: Complex, rate_hz: float) -> tuple[Array, Array]:
+def _envelope(fit: _Modes, poles: Complex, rate_hz: float) -> tuple[Array, Array]:
     """Squared envelopes (m, samples), and the share of its noise (samples,) that the fit left in each sample.
 
     What grows lasts all along. What is over in a few samples, most of whose noise the fit took, is given some more: too
@@ -185,12 +185,12 @@ def _envelope(fit: _Fit, poles: Complex, rate_hz: float) -> tuple[Array, Array]:
     return envelope, np.maximum(1 - (fit.orthonormal**2).sum(axis=1), 0.0)
 
 
-def _loudness(fit: _Fit, rate_hz: float) -> Array:
+def _loudness(fit: _Modes, rate_hz: float) -> Array:
     """How much louder the residual is around each mode, or while it lasts, than on average (m, channels), 1 or more."""
     return np.maximum(np.maximum(1.0, _louder_nearby(fit, rate_hz)), _louder_meanwhile(fit, fit.poles, rate_hz))
 
 
-def _louder_nearby(fit: _Fit, rate_hz: float) -> Array:
+def _louder_nearby(fit: _Modes, rate_hz: float) -> Array:
     """In the residual's spectrum around each mode."""
     loudness_bins = 60  # of the residual's spectrum on which the noise around a mode is measured
     count = len(fit.residual)
@@ -203,14 +203,14 @@ def _louder_nearby(fit: _Fit, rate_hz: float) -> Array:
     return np.asarray((sums[last] - sums[first]) / (last - first)[:, None])
 
 
-def _louder_meanwhile(fit: _Fit, poles: Complex, rate_hz: float) -> Array:
+def _louder_meanwhile(fit: _Modes, poles: Complex, rate_hz: float) -> Array:
     """Under the envelope of each pole (m, channels), but for what the fit took of the noise there."""
     envelope, left = _envelope(fit, poles, rate_hz)
     kept = np.maximum(envelope @ left, 1e-12 * envelope.sum(axis=1))
     return np.asarray(envelope @ fit.residual**2 / (kept[:, None] * fit.noise))
 
 
-def _take_in(fit: _Fit, samples: Array, diagram: tuple[OrderPoles, ...], rate_hz: float, threshold: float) -> _Fit:
+def _take_in(fit: _Modes, samples: Array, diagram: tuple[OrderPoles, ...], rate_hz: float, threshold: float) -> _Modes:
     """Add proposed poles, those that explain most first, as long as they explain more than noise would.
 
     While modes are missing the residual is no noise, and a few more poles are tried before those that are no stronger
@@ -254,7 +254,7 @@ def _different(poles: Complex, duration_s: float) -> Complex:
     return np.asarray(poles[np.unique(cells, return_index=True)[1]])
 
 
-def _fewer(fit: _Fit, samples: Array, diagram: tuple[OrderPoles, ...], rate_hz: float, threshold: float) -> _Fit:
+def _fewer(fit: _Modes, samples: Array, diagram: tuple[OrderPoles, ...], rate_hz: float, threshold: float) -> _Modes:
     """The same or better with the poles of one order for a start.
 
     Modes that overlap, as heavily damped ones do, can lead one at a time into a fit with more poles than there are.
@@ -270,12 +270,12 @@ def _fewer(fit: _Fit, samples: Array, diagram: tuple[OrderPoles, ...], rate_hz: 
     return best
 
 
-def _price(fit: _Fit, threshold: float) -> float:
+def _price(fit: _Modes, threshold: float) -> float:
     """Cost of a fit and its modes; one that nobody would believe is dear."""
     return fit.cost + threshold * len(fit.poles) + (1e300 if (damping_ratio(fit.poles) > _MOST_DAMPING).any() else 0.0)
 
 
-def _gains(fit: _Fit, waves: Array) -> Array:
+def _gains(fit: _Modes, waves: Array) -> Array:
     """Chi-squared by which each proposed pole would better the fit, by channel (m, channels)."""
     new = waves - fit.orthonormal @ (fit.orthonormal.T @ waves)
     cos, sin = new[:, ::2], new[:, 1::2]
@@ -287,7 +287,7 @@ def _gains(fit: _Fit, waves: Array) -> Array:
     return np.asarray(explained / fit.noise)
 
 
-def _judge(fit: _Fit, scale: Array, rate_hz: float, threshold: float) -> tuple[list[FoundMode], list[Rejected]]:
+def _judge(fit: _Modes, scale: Array, rate_hz: float, threshold: float) -> tuple[list[FoundMode], list[Rejected]]:
     largest_error = 0.5  # a damping ratio whose standard error is more than this is none
     modes: list[FoundMode] = []
     rejected: list[Rejected] = []

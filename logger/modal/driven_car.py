@@ -178,7 +178,7 @@ def fit_car(vehicle: Vehicle, pieces: Periodograms, rate_hz: float) -> CarFit:
 
 
 @dataclass(frozen=True, eq=False)
-class _Point:
+class _CarAt:
     """Spectra (j, f), the derivatives of their logarithms by the numbers (q, j, f) and by the logarithm of each one's
     level (j, f), and minus the logarithm of the posterior density."""
 
@@ -189,22 +189,22 @@ class _Point:
     cost: float
 
 
-def _descend(model: CarOnRoads, start: Array, floor_is_known: bool = False) -> tuple[_Point, Array, bool]:
+def _descend(model: CarOnRoads, start: Array, floor_is_known: bool = False) -> tuple[_CarAt, Array, bool]:
     """The most probable numbers (q,) and levels (j,), downhill from a start; the information (q, q) on the numbers
     there, the levels integrated out; and whether it came to rest."""
     pieces, power, q = model.pieces, model.pieces.power, len(start)
 
-    def evaluate(z: Array) -> _Point:
+    def evaluate(z: Array) -> _CarAt:
         x = z[:q]
         shapes, slopes = model.shapes(x)
         level, noise = np.exp(z[q:])[:, None], np.exp(x[-1])
         spectrum = level * shapes + noise
         whittle = float((pieces.worth * (np.log(spectrum) + power / spectrum)).sum())
         by = np.concatenate([level * slopes, np.full((1, *shapes.shape), noise)]) / spectrum
-        return _Point(x, spectrum, by, level * shapes / spectrum,
+        return _CarAt(x, spectrum, by, level * shapes / spectrum,
                       whittle + 0.5 * float(model.precision @ (x - model.start) ** 2))
 
-    def normal_equations(z: Array, at: _Point, fresh: bool) -> tuple[Array, Array]:
+    def normal_equations(z: Array, at: _CarAt, fresh: bool) -> tuple[Array, Array]:
         off = pieces.worth * (power / at.spectrum - 1)
         downhill = np.einsum("qjf,jf->q", at.slopes, off) - model.precision * (at.x - model.start)
         across = np.einsum("qjf,jf->qj", at.slopes, pieces.worth * at.by_level)

@@ -28,7 +28,7 @@ _HOMES = {
     "logger.api.lab.plan": "NextDrive Plan plan",
     "logger.api.rides": "Comfort Record comfort read_record",
     "logger.api.roads": "Iri Profile RoadClass classify iri random_road read_profile write_profile",
-    "logger.api.lab.diagnose": "Candidate Diagnosis SameRoadDiagnosis diagnose diagnose_same_road",
+    "logger.api.lab.diagnose": "Candidate Diagnosis diagnose",
     "logger.api.sections": "Sections sections",
     "logger.api.vehicles": "Calibration EffectInfo Effects Model Slopes calibrate read_vehicle vehicles write_vehicle",
     "logger.errors": "BadInput",

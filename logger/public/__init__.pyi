@@ -23,9 +23,7 @@ from logger.api.lab.compare import add_effect as add_effect
 from logger.api.lab.compare import compare as compare
 from logger.api.lab.diagnose import Candidate as Candidate
 from logger.api.lab.diagnose import Diagnosis as Diagnosis
-from logger.api.lab.diagnose import SameRoadDiagnosis as SameRoadDiagnosis
 from logger.api.lab.diagnose import diagnose as diagnose
-from logger.api.lab.diagnose import diagnose_same_road as diagnose_same_road
 from logger.api.lab.learn import LearnedLaw as LearnedLaw
 from logger.api.lab.learn import learn as learn
 from logger.api.lab.loop import LabStory as LabStory

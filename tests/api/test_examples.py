@@ -109,8 +109,8 @@ def test_what_is_wrong_is_one_line_and_nothing_is_printed(
         lambda: ridelog.modes(channels, "magic"), lambda: ridelog.modes(channels, columns=["c"]),
         lambda: ridelog.modes(channels, "n4sid", input_column="c"), lambda: ridelog.modes(channels, from_s=9.0),
         lambda: ridelog.modes(channels, "armax", input_column="a"),
-        lambda: ridelog.diagnose_same_road(car, run),
-        lambda: ridelog.diagnose_same_road(car, [run, names["runs"][1]], candidates=["magic"]),
+        lambda: ridelog.diagnose(car, run, same_road=True),
+        lambda: ridelog.diagnose(car, [run, names["runs"][1]], candidates=["magic"], same_road=True),
         lambda: ridelog.lab(car, run, tmp_path / "wrong.csv", candidates=["payload"]),
         lambda: ridelog.lab(tmp_path / "vehicle-1.yaml", run, tmp_path, candidates=["payload"]),
     ]

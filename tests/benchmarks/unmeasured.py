@@ -52,8 +52,8 @@ def reported(seed: int, effect: str | None) -> tuple[list[str], tuple[str, ...]]
     verdict = [one.effect.name for one in found.missing]
     alike = found.candidates[0].confused_with if verdict else ()
     print(f"  {effect or 'nothing'} ({seed}): {', '.join(verdict) or 'nothing'}"
-          f"{' or ' + ', '.join(alike) if alike else ''}; {found.excess + 1:.2f} of the noise; errors "
-          f"{', '.join(f'{error:.3f}' for error in found.errors)}; {time.process_time() - started:.0f} s", flush=True)
+          f"{' or ' + ', '.join(alike) if alike else ''}; {found.excess + 1:.2f} of the noise; NRMSE "
+          f"{', '.join(f'{one.error:.3f}' for one in found.steps)}; {time.process_time() - started:.0f} s", flush=True)
     return verdict, alike
 
 

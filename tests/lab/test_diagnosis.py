@@ -109,7 +109,7 @@ def test_what_is_missing_is_named_with_its_numbers_and_errors(offset: LabDiagnos
     error = one.standard_errors["offset_m"]
     assert 0 < error < 0.03 and one.values["offset_m"] == pytest.approx(0.4, abs=4 * error)
     best = offset.candidate("sensor_offset")
-    assert best is offset.candidates[0] and best.values == one.values
+    assert best is offset.candidates[0] and best.one.values == one.values
     assert best.p_value <= probability_by_chance(best.gain, 5) and best.p_value < 1e-9
     assert best.confused_with == ()
 

@@ -19,7 +19,7 @@ from logger.lab.selection.detectability import Undetectable
 from logger.lab.selection.holdout import AS_FILED, JUDGED_ON, REFITTED, ErrorStep
 from logger.report.blocks import text
 from logger.store.formats.effect_file import shipped_effects
-from logger.vehicle.effect import chosen
+from logger.vehicle.effect import Chosen, chosen
 
 from ..support.lab.runs_with_residual import beside_with
 
@@ -27,7 +27,7 @@ EFFECTS = shipped_effects()
 
 
 def candidate(name: str, p_value: float, gain: float, **values: float) -> CandidateEffect:
-    return CandidateEffect(EFFECTS[name], EFFECTS[name].usual | values, 0.2, p_value, gain, gain - 4.0, ())
+    return CandidateEffect(Chosen(EFFECTS[name], EFFECTS[name].usual | values), 0.2, p_value, gain, gain - 4.0, ())
 
 
 OTHERS = (candidate("tire_damping", 0.3, 8.0), candidate("sensor_gain", 1.0, -2.0))
@@ -40,7 +40,7 @@ NOTHING = LabDiagnosis(
 FRICTION = candidate("dry_friction", 1e-12, 500.0, friction_force_n=84.7)
 FOUND = replace(
     NOTHING, candidates=(FRICTION, *OTHERS), verdict=("dry_friction",),
-    effects=(chosen(EFFECTS["dry_friction"], FRICTION.values, standard_errors={
+    effects=(chosen(EFFECTS["dry_friction"], FRICTION.one.values, standard_errors={
         "friction_force_n": 3.9, "transition_velocity_m_per_s": float("inf")}),),
     steps=(NOTHING.steps[0], ErrorStep(REFITTED, 0.25), ErrorStep("with dry_friction", 0.153)))
 
@@ -237,7 +237,7 @@ def test_the_object_has_what_the_contract_promises() -> None:
     assert reported["verdict"] == ["dry_friction"] and reported["unexplained"] is False
     best, *others = reported["candidates"]
     assert {"effect", "parameters", "error", "p_value", "confused_with"} <= best.keys() == others[0].keys()
-    assert best["effect"] == "dry_friction" and best["parameters"] == dict(FRICTION.values)
+    assert best["effect"] == "dry_friction" and best["parameters"] == dict(FRICTION.one.values)
     assert (best["error"], best["p_value"], best["confused_with"]) == (0.2, 1e-12, [])
     assert best["standard_errors"] == {"friction_force_n": 3.9}  # none that is not known
     assert others[0]["standard_errors"] == {}

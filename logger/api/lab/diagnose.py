@@ -6,7 +6,7 @@ shape of what no effect explains.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -19,7 +19,7 @@ from logger.api.lab.bench import Bench, among, bench_with, known_effects, tolera
 from logger.api.lab.checks import check_distances, check_record, driven_parts, thinned_runs
 from logger.api.lab.compare import forces_section, spectra
 from logger.api.lab.question import DiagnoseQuestion
-from logger.api.shared_fields import Runs, each
+from logger.api.shared_fields import each
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
 from logger.chart_data import Array, Bars, Curves, Line
@@ -37,7 +37,7 @@ from logger.lab.unknown_road.same_road import NotOneRoad, SameRoad, placed_by_ro
 from logger.left_out import left_out_json, left_out_lines
 from logger.printable import percent
 from logger.profiles.track import Track
-from logger.question import Notify, function, silent
+from logger.question import function
 from logger.report import document as doc
 from logger.report.blocks import Block, Blocks, Bullets, Detail, Hint, Section, Table, page
 from logger.report.charts import chart
@@ -76,7 +76,8 @@ class Diagnosis(CommandResult):
     """Which physical effects a model lacks.
 
     found                all that the lab found
-    baseline_error       of the model as it stands
+    baseline_error       of the model as it stands; without a profile an error is rms(measured - model) / rms(measured)
+                         of each drive over the road estimated from the others
     noise_floor_error    that the sensor's noise alone makes
     candidates           best first
     verdict              names of the effects that are missing, the most certain first; empty: none
@@ -85,7 +86,7 @@ class Diagnosis(CommandResult):
     vehicle              its name
     """
 
-    found: Any
+    found: LabDiagnosis | UnknownRoadDiagnosis
     baseline_error: float
     noise_floor_error: float
     candidates: tuple[Candidate, ...]
@@ -123,12 +124,18 @@ def diagnosis_of(found: LabDiagnosis, bench: Bench, most: int | None = None, nex
     """What the lab found on a bench, as it is shown; ``most`` so many candidates, None: all."""
     left_out = runs_left_out(bench.runs.runs)
     content = Blocks([*diagnosis_blocks(found, most), *map(Hint, [_compared(bench), *left_out_lines(left_out)])])
+    return _shown(found, content, diagnosis_json(found) | left_out_json(left_out), bench.model.vehicle.name,
+                  next_command)
+
+
+def _shown(found: LabDiagnosis | UnknownRoadDiagnosis, content: Blocks, summary: dict[str, Any], vehicle: str,
+           next_command: str = "") -> Diagnosis:
     errors = {one.effect.name: one.standard_errors for one in found.missing}
-    candidates = tuple(Candidate(one.effect.name, dict(one.values), dict(errors.get(one.effect.name, {})), one.error,
-                                 one.p_value, tuple(one.confused_with)) for one in found.candidates)
-    return Diagnosis(content, diagnosis_json(found) | left_out_json(left_out), found, found.baseline_error,
-                     found.noise_floor_error, candidates, found.verdict, found.unexplained,
-                     tuple((one.words, one.error) for one in found.steps), bench.model.vehicle.name, next_command)
+    candidates = tuple(Candidate(one.effect.name, dict(one.one.values), dict(errors.get(one.effect.name, {})),
+                                 one.error, one.p_value, tuple(one.confused_with)) for one in found.candidates)
+    return Diagnosis(content, summary, found, found.baseline_error, found.noise_floor_error, candidates, found.verdict,
+                     found.unexplained, tuple((one.words, one.error) for one in found.steps), vehicle,
+                     next_command)
 
 
 def _compared(bench: Bench) -> str:
@@ -157,63 +164,17 @@ def _next(question: DiagnoseQuestion, bench: Bench, found: LabDiagnosis) -> str:
 # --- without a profile ---
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class SameRoadDiagnosis(Diagnosis):
-    """Which physical effects a model lacks, as far as drives over an unmeasured road show it.
-
-    An error is rms(measured - model) / rms(measured) of each drive over the road estimated from the other drives.
-
-    run_errors       by name of the run: error before, and with the effects that were found
-    taken_by_road    effects that another road would imitate, and the share of their information that remains with it
-    not_tried        effects that could not be tried, and why
-    undecided        effects that explain a little, but may only imitate something else that is missing
-    cannot_tell      sentences: what these drives do not show
-    """
-
-    run_errors: Mapping[str, tuple[float, float]]
-    taken_by_road: Mapping[str, float]
-    not_tried: Mapping[str, str]
-    undecided: tuple[str, ...]
-    cannot_tell: tuple[str, ...]
-
-
-def diagnose_same_road(
-    vehicle: Model | Path | str, runs: Runs, *, candidates: Collection[str] | None = None,
-    effect_files: Sequence[Path | str] = (), tolerance: float | str | None = None, progress: Notify = silent,
-) -> SameRoadDiagnosis:
-    """As ``diagnose`` with ``same_road``: from two drives or more over one road that nobody measured.
-
-    Raises BadInput for fewer than two runs, drives that are plainly over two roads, and as ``diagnose``. Source: the
-    road is random as ISO 8608 lets expect it, and its waves are found with the car (``logger.lab.unknown_road``).
-
-    >>> found = diagnose_same_road(car, runs, candidates=["sensor_offset", "sensor_gain"])
-    >>> found.verdict, list(found.taken_by_road)
-    ((), ['sensor_gain'])
-    """
-    return _diagnosed_same_road(DiagnoseQuestion(
-        vehicle, runs, candidates=candidates, effect_files=effect_files, tolerance=tolerance, progress=progress,
-        same_road=True, list_all=True))
-
-
-def _diagnosed_same_road(question: DiagnoseQuestion) -> SameRoadDiagnosis:
-    """The answer to ``DiagnoseQuestion`` with ``same_road``."""
+def _diagnosed_same_road(question: DiagnoseQuestion) -> Diagnosis:
+    """From two drives or more over one road that nobody measured: the road is random as ISO 8608 lets expect it, and
+    its waves are found with the car (``logger.lab.unknown_road``)."""
     names = [str(one.path if isinstance(one, Run) else one) for one in each(question.runs)]
     if not 2 <= len(names) == len(set(names)):
         raise question.wrong("same_road", ": expected two runs or more, each once")
     model = model_of(question.vehicle)
-    records = records_of([_drive(one) for one in each(question.runs)])
-    found = _diagnosed(model, records, question)
-    summary = same_road_json(found)
+    found = _diagnosed(model, records_of([_drive(one) for one in each(question.runs)]), question)
     most = None if question.list_all else _SHOWN
-    return SameRoadDiagnosis(
-        Blocks(same_road_blocks(found, names, most)), summary, found, summary["baseline_error"],
-        summary["noise_floor_error"], tuple(
-            Candidate(one["effect"], one["parameters"], one["standard_errors"], one["error"], one["p_value"],
-                      tuple(one["confused_with"])) for one in summary["candidates"]),
-        tuple(summary["verdict"]), found.unexplained, tuple((one["step"], one["error"]) for one in summary["steps"]),
-        model.vehicle.name, "", run_errors=dict(zip(names, found.by_run, strict=True)),
-        taken_by_road=summary["taken_by_road"], not_tried=summary["not_tried"],
-        undecided=tuple(summary["undecided"]), cannot_tell=tuple(cannot_tell(found)))
+    return _shown(found, Blocks(same_road_blocks(found, names, most)), same_road_json(found),
+                  model.vehicle.name)
 
 
 def _drive(given: Run | Path | str) -> tuple[drive_file.Drive, str]:
@@ -285,7 +246,7 @@ def _longest_part(drive: drive_file.Drive) -> drive_file.Drive:
 
 
 def _diagnosed(model: Model, records: Sequence[Record], question: DiagnoseQuestion) -> UnknownRoadDiagnosis:
-    """Which effects the model lacks. BadInput as ``diagnose_same_road``."""
+    """Which effects the model lacks. BadInput for drives that are plainly over two roads."""
     off, given = tolerance_of(question.tolerance, model.known), model.given or model.vehicle
     word, notify = word_of(question.vehicle, model), question.progress
     for one in model.effects:
@@ -472,13 +433,13 @@ def _confusion(names: list[str], found: LabDiagnosis) -> str:
             "ridelog plan predicts whether that would succeed.")
 
 
-def table(found: LabDiagnosis) -> Iterator[tuple[str, str, str, str]]:
+def table(found: LabDiagnosis | UnknownRoadDiagnosis) -> Iterator[tuple[str, str, str, str]]:
     """The candidates, best first: name, error, chance, numbers."""
     by_name = {one.effect.name: one for one in found.missing}
     for one in found.candidates:
         name = one.effect.name
-        numbers = numbers_of(by_name.get(name, Chosen(one.effect, one.values)))
-        yield name, f"{one.error:.3f}", chance(one.p_value), numbers
+        yield (name, f"{one.error:.3f}{'' if one.fitted else ', not fitted'}", chance(one.p_value),
+               numbers_of(by_name.get(name, one.one)))
 
 
 # --- for a program ---
@@ -486,19 +447,11 @@ def table(found: LabDiagnosis) -> Iterator[tuple[str, str, str, str]]:
 
 def diagnosis_json(found: LabDiagnosis) -> dict[str, Any]:
     """The diagnosis as one JSON object."""
-    errors = {one.effect.name: finite(one.standard_errors) for one in found.missing}
     return {
-        "baseline_error": found.baseline_error, "noise_floor_error": found.noise_floor_error,
-        "judged_on": JUDGED_ON,
-        "candidates": [
-            {"effect": one.effect.name, "parameters": dict(one.values), "error": one.error, "p_value": one.p_value,
-             "confused_with": list(one.confused_with), "standard_errors": errors.get(one.effect.name, {}),
-             "log_likelihood_gain": one.gain / 2, "held_out_log_likelihood_gain": one.held_out_gain / 2}
-            for one in found.candidates],
-        "verdict": list(found.verdict), "groups": groups(found), "unexplained": found.unexplained,
+        **_common_json(found), "judged_on": JUDGED_ON, "groups": groups(found),
         "starts": {name: {"ended_there": there, "of": count} for name, (there, count) in found.ends.items()},
         "contradicted": list(found.contradicted),
-        "residual_over_noise": 1 + found.excess, "beyond_tolerance": dict(found.beyond),
+        "beyond_tolerance": dict(found.beyond),
         "parameter_shifts": {name: {"share": share, "standard_error": error}
                           for name, (share, error) in found.moved.items()},
         "fitted_parameters": {name: {"value": value, "standard_error": error}
@@ -511,13 +464,28 @@ def diagnosis_json(found: LabDiagnosis) -> dict[str, Any]:
         "explained_power": {"refitted": found.explained[0], "final": found.explained[1],
                             "best_linear": found.best_linear},
         "tolerance": found.tolerance, "coloured_noise": found.coloured,
-        "steps": [{"step": step.words, "error": step.error} for step in found.steps],
         **lab_words.errors_json(found.steps, found.noise_floor_error), "no_better_than_refitted": list(found.no_better),
         "not_tried": found.not_tried,
         "undetectable": {one.effect.name: one.deviations for one in found.undetectable},
         "unexplained_shape": None if found.shape is None else _shape_json(found.shape),
         **lab_words.band_json(found.band), **lab_words.removed_json(found.removed),
         "sentences": [*diagnosis_summary(found), *looks_like(found)],
+    }
+
+
+def _common_json(found: LabDiagnosis | UnknownRoadDiagnosis) -> dict[str, Any]:
+    """What both kinds of roads have in common."""
+    errors = {one.effect.name: finite(one.standard_errors) for one in found.missing}
+    return {
+        "baseline_error": found.baseline_error, "noise_floor_error": found.noise_floor_error,
+        "candidates": [
+            {"effect": one.effect.name, "parameters": dict(one.one.values), "error": one.error, "p_value": one.p_value,
+             "confused_with": list(one.confused_with), "fitted": one.fitted,
+             "standard_errors": errors.get(one.effect.name, {}), "log_likelihood_gain": one.gain / 2,
+             "held_out_log_likelihood_gain": None if one.held_out_gain is None else one.held_out_gain / 2}
+            for one in found.candidates],
+        "verdict": list(found.verdict), "unexplained": found.unexplained, "residual_over_noise": 1 + found.excess,
+        "steps": [{"step": step.words, "error": step.error} for step in found.steps],
     }
 
 
@@ -541,22 +509,29 @@ def diagnosis_blocks(found: LabDiagnosis, most: int | None) -> Iterator[Block]:
     yield from diagnosis_summary(found)
     yield lab_words.removed_section(found.removed, found.band)
     yield from shape_sections(found)
-    yield lab_words.steps_section([(one.words, one.error) for one in found.steps], found.noise_floor_error)
+    yield _steps(found)
     yield from car_sections(found)
     yield Section(_ONE_BY_ONE, [
         Bars("NRMSE with each effect", "NRMSE", tuple(
             (one.effect.name, one.error) for one in found.candidates[:_MOST_BARS]),
             (found.baseline_error, "file unchanged")),
-        Table(_HEADS, list(table(found)), (0, 3), most, " (--json lists all)"),
+        _table(found, most),
         *([f"No better than the refit alone: {', '.join(found.no_better)}."] if found.no_better else [])])
     yield Section("What these runs cannot tell", [Bullets(untested(found))])
     yield Detail("Sources", [Bullets([f"{one.effect.name}: {one.effect.source}" for one in found.missing])])
 
 
 _ONE_BY_ONE = "One effect at a time on the refitted model; p-values account for all of them"
-_HEADS = ("Effect", "NRMSE", "p-value", "Parameters")
 _LEAST_SHARE, _MOST_BARS = 0.01, 12
 _MOTION_UNITS = {RATE: "m/s", TRAVEL: "m"}
+
+
+def _table(found: LabDiagnosis | UnknownRoadDiagnosis, most: int | None) -> Table:
+    return Table(("Effect", "NRMSE", "p-value", "Parameters"), list(table(found)), (0, 3), most, " (--json lists all)")
+
+
+def _steps(found: LabDiagnosis | UnknownRoadDiagnosis) -> Detail:
+    return lab_words.steps_section([(one.words, one.error) for one in found.steps], found.noise_floor_error)
 
 
 def shape_sections(found: LabDiagnosis) -> list[Section]:
@@ -622,7 +597,7 @@ def same_road_summary(found: UnknownRoadDiagnosis) -> list[str]:
     """What is missing, how certain that is, and what it could be instead: paragraphs."""
     lines = []
     for one in found.missing:
-        candidate = next(other for other in found.candidates if other.name == one.effect.name)
+        candidate = next(other for other in found.candidates if other.effect == one.effect)
         numbers = f": {numbers_of(one)}" if one.values else ""
         lines.append(f"{one.effect.name} is missing ({one.effect.title}){numbers}. {P_VALUE} "
                      f"{chance(candidate.p_value)}.")
@@ -633,28 +608,21 @@ def same_road_summary(found: UnknownRoadDiagnosis) -> list[str]:
             lines.append(f"{one.effect.name} is nonlinear. The search linearised it for each drive and stretch of "
                          "road; its parameters are only as accurate as that.")
     if found.undecided:
-        names, them = enumerated([one.name for one in found.undecided], "or"), len(found.undecided) > 1
+        names, them = enumerated([one.effect.name for one in found.undecided], "or"), len(found.undecided) > 1
         lines.append(f"Undecided: {names}. {'They explain' if them else 'It explains'} more than noise would, but less "
                      "than a tenth of the residual that no road explains, and may only imitate something else that is "
                      "missing.")
     elif not lines:
         lines.append("None of the effects that can be tried without a profile is missing.")
-    by_step = [f"{error:.3f} with {words.removeprefix('with ')}" for words, error in _same_road_steps(found)]
+    by_step = [f"{step.error:.3f} with {step.words.removeprefix('with ')}" for step in found.steps]
     lines.append(f"NRMSE of each drive over the road estimated from the others: {', '.join(by_step)}. Noise floor: "
-                 f"{found.floor_error:.3f}.")
+                 f"{found.noise_floor_error:.3f}.")
     if found.unexplained:
         cause = ("Something else is missing, perhaps" if found.exact_places else
                  "Either the GPS distances of these drives drift within seconds, or something else is missing, perhaps")
         lines.append(f"The residual that no road explains is {1 + found.excess:.2f} times the sensor's noise. {cause} "
                      "one of the effects that only a measured road can show.")
     return lines
-
-
-def _same_road_steps(found: UnknownRoadDiagnosis) -> list[tuple[str, float]]:
-    """Models on the way, each with its error."""
-    words = ["the vehicle's file unchanged", "its parameters refitted within their tolerance",
-             *(f"with {one.effect.name}" for one in found.missing)]
-    return list(zip(words, found.errors, strict=True))
 
 
 def cannot_tell(found: UnknownRoadDiagnosis) -> list[str]:
@@ -673,10 +641,8 @@ def cannot_tell(found: UnknownRoadDiagnosis) -> list[str]:
 def same_road_blocks(found: UnknownRoadDiagnosis, runs: Sequence[str], most: int | None) -> Iterator[Block]:
     """What a person reads; at a terminal ``most`` so many candidates, None: all."""
     yield from same_road_summary(found)
-    yield lab_words.steps_section(_same_road_steps(found), found.floor_error)
-    yield Section(_ONE_BY_ONE, [Table(_HEADS, [
-        (one.name, f"{one.error:.3f}{'' if one.fitted else ', not fitted'}", chance(one.p_value), numbers_of(one.one))
-        for one in found.candidates], (0, 3), most, " (--json lists all)")])
+    yield _steps(found)
+    yield Section(_ONE_BY_ONE, [_table(found, most)])
     yield Table(("Run", "NRMSE before", "after"), [
         (name, f"{before:.3f}", f"{after:.3f}") for name, (before, after) in zip(runs, found.by_run, strict=True)])
     yield Section("What these drives cannot tell", [Bullets(cannot_tell(found))])
@@ -684,21 +650,10 @@ def same_road_blocks(found: UnknownRoadDiagnosis, runs: Sequence[str], most: int
 
 def same_road_json(found: UnknownRoadDiagnosis) -> dict[str, Any]:
     """The diagnosis as one JSON object."""
-    errors = {one.effect.name: finite(one.standard_errors) for one in found.missing}
-    values = {one.effect.name: dict(one.values) for one in found.missing}
     return {
-        "baseline_error": found.errors[0], "noise_floor_error": found.floor_error,
-        "candidates": [
-            {"effect": one.name, "parameters": values.get(one.name, dict(one.one.values)),
-             "error": one.error, "p_value": one.p_value,
-             "confused_with": list(one.confused_with), "fitted": one.fitted,
-             "standard_errors": errors.get(one.name, {}), "log_likelihood_gain": one.gain / 2}
-            for one in found.candidates],
-        "verdict": [one.effect.name for one in found.missing], "unexplained": found.unexplained,
-        "residual_over_noise": 1 + found.excess,
-        "steps": [{"step": words, "error": error} for words, error in _same_road_steps(found)],
+        **_common_json(found),
         "runs": [{"error_before": before, "error_after": after} for before, after in found.by_run],
-        "undecided": [one.name for one in found.undecided],
+        "undecided": [one.effect.name for one in found.undecided],
         "maybe_over_two_roads": [list(pair) for pair in found.doubtful],
         "not_tried": dict(found.untried), "taken_by_road": dict(found.absorbed_by_road),
         "undetectable": dict(found.hidden),

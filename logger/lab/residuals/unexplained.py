@@ -87,7 +87,7 @@ class Drift:
 
 
 @dataclass(frozen=True, eq=False)
-class _Fit:
+class _Curve:
     form: str
     bic: float
     size_mps2: float
@@ -165,12 +165,12 @@ def _shapes(time_s: Array, rate_hz: float) -> dict[str, list[_Form]]:
     }
 
 
-def _fit_white(form: str, basis: _Cosines, seen: Array, level: float, time_s: Array, shapes: Sequence[_Form]) -> _Fit:
+def _fit_white(form: str, basis: _Cosines, seen: Array, level: float, time_s: Array, shapes: Sequence[_Form]) -> _Curve:
     """The most likely curve of a form, with a constant, in white noise."""
     if not shapes:
         offset = float(seen[0]) / float(np.sqrt(basis.samples))
         bic = float(seen[1:] @ seen[1:]) / level + float(np.log(basis.count))
-        return _Fit(form, bic, offset, None, lambda at: np.full(len(at), offset))
+        return _Curve(form, bic, offset, None, lambda at: np.full(len(at), offset))
     columns = basis.of(np.stack([shape(time_s) for _, shape in shapes]))[:, : basis.count]
     # The constant is the first coefficient alone.
     free = columns[:, 1:]
@@ -181,11 +181,11 @@ def _fit_white(form: str, basis: _Cosines, seen: Array, level: float, time_s: Ar
     size = float(sizes[best])
     offset = float(seen[0] - size * columns[best, 0]) / float(np.sqrt(basis.samples))
     numbers = 2 if known_s is None else 3
-    return _Fit(form, float(bics[best]) + numbers * float(np.log(basis.count)), size, known_s,
+    return _Curve(form, float(bics[best]) + numbers * float(np.log(basis.count)), size, known_s,
                 lambda at: offset + size * shape(at))
 
 
-def _fit_random_walk(basis: _Cosines, seen: Array, level: float, first: int) -> _Fit:
+def _fit_random_walk(basis: _Cosines, seen: Array, level: float, first: int) -> _Curve:
     """The most likely random walk in white noise."""
     numbers = np.arange(1, basis.count)
     powers = seen[1:] ** 2
@@ -198,7 +198,7 @@ def _fit_random_walk(basis: _Cosines, seen: Array, level: float, first: int) -> 
     kept[1:] = seen[1:] * (1 - level / spectra[best])
     curve = basis.back(kept)
     whole = np.concatenate([np.full(first, curve[0]), curve])
-    return _Fit(WANDER, float(bics[best]) + 2 * float(np.log(basis.count)), float(np.sqrt(np.mean(curve**2))), None,
+    return _Curve(WANDER, float(bics[best]) + 2 * float(np.log(basis.count)), float(np.sqrt(np.mean(curve**2))), None,
                 lambda at: whole)
 
 

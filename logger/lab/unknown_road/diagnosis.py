@@ -17,12 +17,13 @@ import numpy as np
 
 from logger.fitting.information_matrix import integrated_out, inverse
 from logger.identification.identifiability import NOT_ONE_ROAD, Finding, structural
+from logger.lab.diagnosis import CandidateEffect
 from logger.lab.likelihood.noise_floor import NoiseLevel
 from logger.lab.likelihood.standard_errors import with_standard_errors
 from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE, probability_by_chance
-from logger.lab.selection.holdout import HoldOut
+from logger.lab.selection.holdout import AS_FILED, REFITTED, ErrorStep, HoldOut
 from logger.lab.selection.screening import shared_parameters
 from logger.lab.selection.stepwise import Likelihood, Search, SearchEffort, Selection, names_of
 from logger.lab.unknown_road.same_road import (
@@ -50,38 +51,12 @@ show it seven times as well (root of 1 / 0.02)."""
 
 
 @dataclass(frozen=True, eq=False)
-class SharedRoadCandidate:
-    """An effect that was tried.
-
-    error            leave-one-out error of all drives
-    p_value          bound on the probability that noise alone gains as much with any of the candidates
-    gain             of minus twice the log of the evidence; where it was not fitted, by its score test
-    confused_with    effects that explain about as much
-    fitted           with the car's numbers and the road; else it was added at the best strength of its score test
-    stands_in        whether it bends the laws of the car, so that linear ones stood in for it
-    """
-
-    one: Chosen
-    error: float
-    p_value: float
-    gain: float
-    confused_with: tuple[str, ...] = ()
-    fitted: bool = True
-    stands_in: bool = False
-
-    @property
-    def name(self) -> str:
-        """The effect's name."""
-        return self.one.effect.name
-
-
-@dataclass(frozen=True, eq=False)
 class UnknownRoadDiagnosis:
     """The result of a diagnosis without a profile.
 
     candidates    best first, those of the verdict before the others
     missing       effects that the model lacks, with standard errors, in the order they were found
-    errors        of all drives: as the vehicle's file says, with its numbers refitted, with each effect that was found
+    steps         models on the way, each with its leave-one-out error of all drives
     by_run        error of each run, before and after
     untried       effects that could not be tried, and why
     hidden        effects that would stand out by so many deviations at their usual strength, which are too few
@@ -93,11 +68,11 @@ class UnknownRoadDiagnosis:
     exact_places  whether the distances of the drives are a recorder's, not a receiver's
     """
 
-    candidates: tuple[SharedRoadCandidate, ...]
+    candidates: tuple[CandidateEffect, ...]
     missing: tuple[Chosen, ...]
-    errors: tuple[float, ...]
+    steps: tuple[ErrorStep, ...]
     by_run: tuple[tuple[float, float], ...]
-    floor_error: float
+    noise_floor_error: float
     untried: Mapping[str, str]
     absorbed_by_road: Mapping[str, float]
     hidden: Mapping[str, float]
@@ -105,8 +80,18 @@ class UnknownRoadDiagnosis:
     noise_mps2: float
     excess: float
     doubtful: tuple[tuple[str, str], ...] = ()
-    undecided: tuple[SharedRoadCandidate, ...] = ()
+    undecided: tuple[CandidateEffect, ...] = ()
     exact_places: bool = True
+
+    @property
+    def baseline_error(self) -> float:
+        """Of the model as it stands."""
+        return self.steps[0].error
+
+    @property
+    def verdict(self) -> tuple[str, ...]:
+        """Names of the effects that the model lacks."""
+        return tuple(one.effect.name for one in self.missing)
 
     @property
     def unexplained(self) -> bool:
@@ -305,11 +290,12 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
         chosen(one, one.usual) for one in remaining])}
     road = {name: one.share_beyond_road for name, one in usual.items() if one.share_beyond_road < ABSORBED_BY_ROAD}
     by_name = {one.effect.name: one for one in _with_errors(now.fit)}
-    errors = [as_filed, base.hold_out.error, *(steps.get(name, now.hold_out).error for name in names)]
-    errors[-1] = now.hold_out.error
+    way = [ErrorStep(AS_FILED, as_filed), ErrorStep(REFITTED, base.hold_out.error),
+           *(ErrorStep(f"with {name}", steps.get(name, now.hold_out).error) for name in names)]
+    way[-1] = replace(way[-1], error=now.hold_out.error)
     undecided = [one for one in selection.last.fits if search.may_imitate(now, one)]
     return UnknownRoadDiagnosis(
-        _candidates(selection, len(tried)), tuple(by_name[name] for name in names), tuple(errors),
+        _candidates(selection, len(tried)), tuple(by_name[name] for name in names), tuple(way),
         tuple(zip(before.problem.errors(before.state), now.problem.errors(now.state), strict=True)),
         now.noise.deviation_mps2 / now.problem.size_mps2, untried, road,
         {name: one.deviations for name, one in usual.items() if one.deviations < DETECTABLE_SIGMA and name not in road},
@@ -320,16 +306,16 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
 
 
 def _candidates(selection: Selection[RoadModel, RoadTrial, RoadCandidate], count: int
-                ) -> tuple[SharedRoadCandidate, ...]:
+                ) -> tuple[CandidateEffect, ...]:
     """Effects that were found, then the others of the first round, best first."""
     now, hold_outs = selection.now, dict(selection.steps)
     found = []
     for name, gain in selection.gains.items():
         one = next(one for one in now.effects if one.effect.name == name)
         error = hold_outs.get(name, now.hold_out).error
-        found.append(SharedRoadCandidate(one, error, probability_by_chance(gain, count), gain,
-                                         selection.rivals.get(name, ()),
-                                         stands_in=not now.problem.is_linear([one], now.state.logs)))
+        found.append(CandidateEffect(one, error, probability_by_chance(gain, count), gain,
+                                     confused_with=selection.rivals.get(name, ()),
+                                     stands_in=not now.problem.is_linear([one], now.state.logs)))
     fits = selection.first.fits
     others = [replace(_candidate(one, count), confused_with=tuple(
         other.effect.name for other in fits if other is not one and abs(other.gain - one.gain) < INDISTINGUISHABLE
@@ -339,17 +325,17 @@ def _candidates(selection: Selection[RoadModel, RoadTrial, RoadCandidate], count
         best = trial.starts[0].best
         there = UnmeasuredRoad(lambda words: None)._state(before, (*before.effects, best))
         gain = trial.gain - len(free_parameters_of([best])) * float(np.log(before.problem.samples))
-        others.append(SharedRoadCandidate(best, before.problem.error(there), probability_by_chance(gain, count), gain,
-                                          fitted=False, stands_in=not before.problem.is_linear([best], there.logs)))
+        others.append(CandidateEffect(best, before.problem.error(there), probability_by_chance(gain, count), gain,
+                                      fitted=False, stands_in=not before.problem.is_linear([best], there.logs)))
     others.sort(key=lambda one: (not one.fitted, -one.gain))
-    return (*found, *(one for one in others if one.name not in selection.gains))
+    return (*found, *(one for one in others if one.effect.name not in selection.gains))
 
 
-def _candidate(one: RoadCandidate, count: int) -> SharedRoadCandidate:
+def _candidate(one: RoadCandidate, count: int) -> CandidateEffect:
     """A fitted effect as one of so many candidates."""
     model = one.model
-    return SharedRoadCandidate(one.chosen, model.hold_out.error, probability_by_chance(one.gain, count), one.gain,
-                               stands_in=not model.problem.is_linear([one.chosen], model.state.logs))
+    return CandidateEffect(one.chosen, model.hold_out.error, probability_by_chance(one.gain, count), one.gain,
+                           stands_in=not model.problem.is_linear([one.chosen], model.state.logs))
 
 
 def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequence[Chosen]

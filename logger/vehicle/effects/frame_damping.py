@@ -35,7 +35,7 @@ class FrameDamping(BodyEffect):
         return replace(structure, damping=structure.damping + drag)
 
 
-class _OfMass(FrameDamping):
+class _MassDamping(FrameDamping):
     title = "on a rig: viscous drag of the mass against its guide"
     parameters = (replace(FrameDamping.parameters[0], name="body_damping_n_s_per_m",
                           meaning="of the mass against its guide"),)
@@ -50,4 +50,4 @@ class _OfMass(FrameDamping):
 
 
 EFFECT = FrameDamping()
-EFFECT.variants = {"single_mass": _OfMass()}
+EFFECT.variants = {"single_mass": _MassDamping()}

@@ -47,7 +47,7 @@ class FrameFriction(ForceEffect):
                        guide_stribeck=Stribeck(p.static_to_sliding_ratio, p.stribeck_velocity_m_per_s))
 
 
-class _OfMass(FrameFriction):
+class _MassFriction(FrameFriction):
     title = "on a rig: Coulomb friction of the mass against its guide"
     parameters = tuple(one for one in FrameFriction.parameters if not one.name.startswith("body"))
     signature = "small motions of the mass against the ground die away at once, even when its spring does not move"
@@ -60,4 +60,4 @@ class _OfMass(FrameFriction):
 
 
 EFFECT = FrameFriction()
-EFFECT.variants = {"single_mass": _OfMass()}
+EFFECT.variants = {"single_mass": _MassFriction()}

@@ -12,8 +12,10 @@ import pytest
 from logger.api.lab.diagnose import same_road_json
 from logger.identification.unknown_road.marginal_likelihood import at_n0
 from logger.identification.unknown_road.road_operator import Crossing, RoadDrive, grid_under
+from logger.lab.diagnosis import CandidateEffect
 from logger.lab.likelihood.priors import Tolerance
-from logger.lab.unknown_road.diagnosis import SharedRoadCandidate, UnknownRoadDiagnosis, diagnose_same_road
+from logger.lab.selection.holdout import AS_FILED, REFITTED, ErrorStep
+from logger.lab.unknown_road.diagnosis import UnknownRoadDiagnosis, diagnose_same_road
 from logger.lab.unknown_road.same_road import (
     DriveConditions,
     NotOneRoad,
@@ -46,6 +48,7 @@ RATE_HZ, SPACING_M, NOISE_MPS2 = 100.0, 0.05, 0.05
 LONG = Track(SPACING_M, generate(64.0, 220.0, SPACING_M, 3), -110.0)
 OTHER = Track(SPACING_M, generate(64.0, 220.0, SPACING_M, 4), -110.0)
 FLAT = Track(1.0, np.zeros(2))
+STEPS = (ErrorStep(AS_FILED, 0.4), ErrorStep(REFITTED, 0.3))
 
 
 def named(name: str, **values: float) -> Chosen:
@@ -138,12 +141,12 @@ def test_friction_is_not_taken_for_another_damping() -> None:
     found = diagnose_same_road(SameRoad(runs, CAR, Tolerance()), effects)
     assert "tire_damping" not in [one.effect.name for one in found.missing]
     assert [one.effect.name for one in found.missing] in ([], ["dry_friction"])
-    assert found.missing or "dry_friction" in [one.name for one in found.undecided]
+    assert found.missing or "dry_friction" in [one.effect.name for one in found.undecided]
 
 
 def test_what_may_only_imitate_is_not_named() -> None:
-    one = SharedRoadCandidate(named("tire_damping", tire_damping_n_s_per_m=300.0), 0.28, 1e-12, 60.0)
-    found = UnknownRoadDiagnosis((one,), (), (0.4, 0.3), (), 0.1, {}, {}, {}, (), 0.1, 0.5, undecided=(one,))
+    one = CandidateEffect(named("tire_damping", tire_damping_n_s_per_m=300.0), 0.28, 1e-12, 60.0)
+    found = UnknownRoadDiagnosis((one,), (), STEPS, (), 0.1, {}, {}, {}, (), 0.1, 0.5, undecided=(one,))
     reported = same_road_json(found)
     assert reported["verdict"] == [] and reported["undecided"] == ["tire_damping"]
     assert any(words.startswith("Undecided: tire_damping. It explains more than") for words in reported["sentences"])
@@ -268,8 +271,8 @@ def test_a_refitted_car_is_as_far_off_as_it_is_from_what_was_given() -> None:
 
 
 def test_what_was_not_fitted_says_so() -> None:
-    one = SharedRoadCandidate(named("tire_damping", tire_damping_n_s_per_m=300.0), 0.28, 0.5, 1.0, fitted=False)
-    found = UnknownRoadDiagnosis((one,), (), (0.4, 0.3), (), 0.1, {}, {}, {}, (), 0.1, 0.1,
+    one = CandidateEffect(named("tire_damping", tire_damping_n_s_per_m=300.0), 0.28, 0.5, 1.0, fitted=False)
+    found = UnknownRoadDiagnosis((one,), (), STEPS, (), 0.1, {}, {}, {}, (), 0.1, 0.1,
                   (("slow", "brisk"),))
     reported = same_road_json(found)
     assert reported["candidates"][0]["error"] == 0.28 and reported["candidates"][0]["fitted"] is False
@@ -284,7 +287,7 @@ def test_no_noise_at_all_breaks_nothing() -> None:
     bandwidth = shipped_effects()["sensor_bandwidth"]
     found = diagnose_same_road(problem, {bandwidth.name: bandwidth})
     assert found.missing == () and not found.unexplained
-    assert 0.002 <= found.floor_error < 0.01
+    assert 0.002 <= found.noise_floor_error < 0.01
     assert problem.least_mps2 <= found.noise_mps2 < 0.01 * problem.size_mps2
 
 
@@ -301,7 +304,7 @@ def test_noise_that_went_through_the_recorders_filter_is_noise_all_the_same() ->
     bandwidth = shipped_effects()["sensor_bandwidth"]
     found = diagnose_same_road(SameRoad(runs, CAR, Tolerance()), {bandwidth.name: bandwidth})
     assert found.missing == () and not found.unexplained
-    assert found.floor_error * SameRoad(runs, CAR, Tolerance()).size_mps2 == pytest.approx(NOISE_MPS2, rel=0.2)
+    assert found.noise_floor_error * SameRoad(runs, CAR, Tolerance()).size_mps2 == pytest.approx(NOISE_MPS2, rel=0.2)
 
 
 @pytest.mark.parametrize("order", [(0, 1, 2), (0, 2, 1), (2, 0, 1)])
@@ -335,4 +338,4 @@ def test_what_fills_the_highest_frequencies_is_not_taken_for_noise() -> None:
     problem = SameRoad(runs, CAR, Tolerance())
     found = diagnose_same_road(problem, {gain.name: gain})
     assert found.unexplained and found.excess > 2
-    assert found.floor_error * problem.size_mps2 == pytest.approx(0.01, rel=0.2)
+    assert found.noise_floor_error * problem.size_mps2 == pytest.approx(0.01, rel=0.2)

@@ -65,7 +65,7 @@ def test_an_effect_is_found_although_the_distances_wander() -> None:
     exact = SameRoad([first, second], CAR, TOLERANCE)
     true = exact.start([hidden])
     attainable = exact.error(fit(exact.preconditioned(true), true).state)
-    assert found.errors[-1] < 1.15 * attainable
+    assert found.steps[-1].error < 1.15 * attainable
     for before, after in found.by_run:
-        assert 0.5 < before / found.errors[1] < 2.0  # of runs about as loud
+        assert 0.5 < before / found.steps[1].error < 2.0  # of runs about as loud
         assert after < before
