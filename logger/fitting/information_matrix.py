@@ -32,6 +32,12 @@ def inverse(information: Array) -> Array:
     return np.asarray(whiten.T @ whiten)
 
 
+def correlation_of(covariance: Array) -> Array:
+    """Correlations (m, m) of estimates with this covariance."""
+    deviations = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    return np.asarray(covariance / np.outer(deviations, deviations))
+
+
 def integrated_out(information: Array, nuisance: npt.NDArray[np.intp]) -> Array:
     """Information on the other numbers when those of these indices are integrated out (Schur complement)."""
     own = np.setdiff1d(np.arange(len(information)), nuisance)

@@ -96,9 +96,7 @@ class Fit:
 
     free               the numbers that were free, with their starts and bounds
     parameters         estimates by name
-    standard_errors    by name
     covariance         (p, p) of the estimates, in their order
-    correlation        (p, p)
     error_before       rms(measured - model) / rms(measured) at the start
     error_after        the same at the estimates
     residuals          measured minus model, per record
@@ -116,9 +114,7 @@ class Fit:
 
     free: list[Free]
     parameters: dict[str, float]
-    standard_errors: dict[str, float]
     covariance: Array
-    correlation: Array
     error_before: float
     error_after: float
     residuals: list[Array]
@@ -132,6 +128,11 @@ class Fit:
     at_bound: list[str]
     ends: Array
     prior: tuple[Array, Array]
+
+    @property
+    def standard_errors(self) -> dict[str, float]:
+        """By name."""
+        return dict(zip(self.parameters, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
 
     @property
     def information(self) -> Array:
@@ -339,16 +340,13 @@ def _result(problem: _FitProblem, point: _ResidualsAt, noise: Whitening, iterati
                     or unexplained(normalised_rms(point.plain, problem.observed))):
         raise NotIdentifiable(findings)
     scale = problem.coordinates.slopes(values)
-    covariance = relative * np.outer(scale, scale)
-    errors = np.sqrt(np.diag(covariance))
     start = np.array([one.start for one in problem.free])
     before, after = (
         [seen - one for seen, one in zip(problem.measured, problem.model.predict(at), strict=True)]
         for at in (start, values)
     )
     return Fit(free=problem.free, parameters=dict(zip(names, values.tolist(), strict=True)),
-               standard_errors=dict(zip(names, errors.tolist(), strict=True)), covariance=covariance,
-               correlation=covariance / np.maximum(np.outer(errors, errors), 1e-300),
+               covariance=relative * np.outer(scale, scale),
                error_before=normalised_rms(before, problem.measured),
                error_after=normalised_rms(after, problem.measured), residuals=after,
                white=np.split(point.white, np.cumsum([len(one) for one in point.plain])[:-1]),

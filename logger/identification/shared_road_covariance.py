@@ -74,13 +74,10 @@ def with_common_roughness(model: DriveModel, fit: Fit) -> CommonRoughness:
     scale = Coordinates(fit.free).slopes(values)
     independent = np.linalg.pinv(fit.sensitivities.T @ fit.sensitivities, hermitian=True)
     wider = fit.covariance + share * np.outer(scale, scale) * (independent @ crossed @ independent)
-    variances = np.maximum(np.diag(wider), np.diag(fit.covariance))
+    alone_variances = np.diag(fit.covariance)
+    variances = np.maximum(np.diag(wider), alone_variances)
     np.fill_diagonal(wider, variances)
-    errors = np.sqrt(variances)
-    growth = float((errors / np.sqrt(np.diag(fit.covariance))).max())
-    widened = replace(fit, covariance=wider, correlation=wider / np.outer(errors, errors),
-                      standard_errors=dict(zip(fit.parameters, errors.tolist(), strict=True)))
-    return CommonRoughness(widened, share, growth)
+    return CommonRoughness(replace(fit, covariance=wider), share, float(np.sqrt(variances / alone_variances).max()))
 
 
 @dataclass(frozen=True, eq=False)

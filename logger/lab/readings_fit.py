@@ -176,10 +176,8 @@ def _with_covariance(found: Fit, places: _Shift) -> Fit:
     own = found.covariance * count / max(count - places.freedom, 1.0)  # what was fitted to places leaves less
     scale = np.sqrt(np.diag(own) / np.maximum(np.diag(alone), 1e-300))
     covariance = np.linalg.pinv(information - places.lost, rcond=1e-15, hermitian=True) * np.outer(scale, scale)
-    errors = np.sqrt(np.maximum(np.diag(covariance), np.diag(own)))
-    np.fill_diagonal(covariance, errors**2)
-    return replace(found, covariance=covariance, correlation=covariance / np.outer(errors, errors),
-                   standard_errors=dict(zip(found.parameters, errors.tolist(), strict=True)))
+    np.fill_diagonal(covariance, np.maximum(np.diag(covariance), np.diag(own)))
+    return replace(found, covariance=covariance)
 
 
 def _with_rounding_noise(found: Fit, first: Fit, model: DriveModel, records: Sequence[Run]) -> Fit:

@@ -8,6 +8,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
+from logger.fitting.information_matrix import correlation_of
 from logger.identification.drive_model import DriveModel
 from logger.identification.identifiability import UNEXPLAINED, NotIdentifiable
 from logger.identification.noise_models import Autoregressive, RoadNoise, White
@@ -72,8 +73,8 @@ def test_scipy_on_the_stepping_simulation_says_the_same() -> None:
     unit = np.array([875, 23_088])
     assert np.array(list(ours.parameters.values())) / unit == pytest.approx(theirs.x, abs=2e-3 * errors.min())
     assert np.array(list(ours.standard_errors.values())) / unit == pytest.approx(errors, rel=2e-3)
-    assert ours.correlation[0, 1] == pytest.approx(np.linalg.inv(theirs.jac.T @ theirs.jac)[0, 1] * deviation**2
-                                                   / errors.prod(), abs=1e-3)
+    covariance = np.linalg.inv(theirs.jac.T @ theirs.jac) * deviation**2
+    assert correlation_of(ours.covariance)[0, 1] == pytest.approx(covariance[0, 1] / errors.prod(), abs=1e-3)
 
 
 def test_every_start_ends_at_the_same_mass() -> None:

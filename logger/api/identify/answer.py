@@ -24,9 +24,10 @@ from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, check_forces, model_of
 from logger.chart_data import Array, Bars, Chart, Curves, Line
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput, CheckFailed
+from logger.fitting.information_matrix import correlation_of
 from logger.identification.drive_model import DriveModel
 from logger.identification.identifiability import NotIdentifiable
-from logger.identification.noise_models import UNTESTED, Test, autocorrelation, cross_correlation
+from logger.identification.noise_models import UNTESTED, Test, autocorrelation, autocorrelations, cross_correlation
 from logger.identification.prediction_error_fit import Fit, FitOptions, least_share
 from logger.identification.session import (
     LEAST_SAMPLES,
@@ -521,7 +522,7 @@ def _fit_json(fit: Fit | RoadFit, free: Sequence[Free], names: Sequence[str]) ->
         "converged": fit.converged, "start": {one.name: one.start for one in free},
         "bounds": {one.name: [one.low, one.high] for one in free},
         "correlation": {name: dict(zip(names, row, strict=True))
-                        for name, row in zip(names, _correlation(fit).tolist(), strict=True)},
+                        for name, row in zip(names, correlation_of(fit.covariance).tolist(), strict=True)},
         "at_bound": fit.at_bound, "iterations": fit.iterations}
 
 
@@ -636,14 +637,9 @@ def _table(fit: Fit | RoadFit, free: Sequence[Free]) -> Table:
                  (0, 7))
 
 
-def _correlation(fit: Fit | RoadFit) -> Array:
-    deviations = np.sqrt(np.maximum(np.diag(fit.covariance), 1e-300))
-    return np.asarray(fit.covariance / np.outer(deviations, deviations))
-
-
 def _pairs(names: Sequence[str], fit: Fit | RoadFit, between: str) -> list[tuple[str, float]]:
     """Each two numbers with the correlation of their errors, the most correlated first."""
-    found = _correlation(fit)
+    found = correlation_of(fit.covariance)
     return sorted(((f"{names[i]}{between}{names[j]}", float(found[i, j]))
                    for i, j in combinations(range(len(names)), 2)), key=lambda pair: -abs(pair[1]))
 
@@ -731,11 +727,9 @@ def charts(fit: Fit | RoadFit) -> list[Chart]:
 
 def _left(white: list[Array]) -> Curves:
     """G. M. Ljung and G. E. P. Box 1978: of white residuals each is nearly normal, of variance 1 / n."""
-    count, power = sum(map(len, white)), max(sum(float(one @ one) for one in white), 1e-300)
-    lags = np.arange(1, min(_LAGS, min(map(len, white)) - 1) + 1)
-    found = np.array([sum(float(one[lag:] @ one[:-lag]) for one in white) for lag in lags]) / power
-    bound = np.full(len(lags), NORMAL_95 / np.sqrt(count))
+    found = autocorrelations(white, min(_LAGS, min(map(len, white)) - 1))
+    lags = np.arange(1.0, len(found) + 1)
+    bound = np.full(len(lags), NORMAL_95 / np.sqrt(sum(map(len, white))))
     return Curves("Autocorrelation of the residuals", "lag [samples]", "correlation", (
-        Line("residuals", lags.astype(np.float64), found),
-        Line("95 % of white noise", lags.astype(np.float64), bound, faint=True),
-        Line("", lags.astype(np.float64), -bound, faint=True)), (0.0, ""))
+        Line("residuals", lags, found), Line("95 % of white noise", lags, bound, faint=True),
+        Line("", lags, -bound, faint=True)), (0.0, ""))
