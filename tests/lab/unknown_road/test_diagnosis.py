@@ -95,7 +95,7 @@ def test_responses_are_those_of_the_simulation(effect: Chosen) -> None:
     named("bump_stop", clearance_m=0.03, stop_stiffness_n_per_m=1e5),
 ], ids=lambda one: one.effect.name)
 def test_what_bends_its_laws_has_no_response(effect: Chosen) -> None:
-    with pytest.raises(ValueError, match="in proportion"):
+    with pytest.raises(ValueError, match="expected a linear car"):
         response_of(compose(CAR, [effect]), RATE_HZ)
 
 
