@@ -141,7 +141,7 @@ def _hostile(inputs: int, huge_gb: float) -> Group:
 def _readers(counts: dict[str, Counts]) -> list[Line]:
     return [Line(
         f"`{name}`", "damaged valid input", "read as it stands, or refused in one line; within 2 s",
-        f"{one.accepted} read, {one.refused} refused, {one.ends} different ends, slowest {one.slowest_s:.2f} s, "
+        f"{one.accepted} read, {one.refused} refused, {one.ends} different outcomes, slowest {one.slowest_s:.2f} s, "
         f"memory +{one.memory_mb:.0f} MB" if not one.broken else f"**BROKEN**: {one.broken} inputs", one.inputs,
         wrong=(f"{name}: {one.broken} inputs",) * bool(one.broken)) for name, one in counts.items()]
 

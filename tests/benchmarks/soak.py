@@ -50,7 +50,7 @@ def _resources(found: Soaked, warm_us: int, figures: Figures) -> None:
     figures.at_most("open files, most less fewest", max(open_files) - min(open_files), 1, "")
     folder_bytes = max(sample.folder_bytes for sample in found.samples)
     figures.at_most("folder, largest", folder_bytes / 1e6, QUOTA_BYTES / 1e6, "MB")
-    figures.at_least("recorded before the room went to the logs", found.dump_s / 3600, 4, "h")
+    figures.at_least("recorded before space was kept for logs", found.dump_s / 3600, 4, "h")
     figures.at_most("largest log file", max(found.log_bytes) / 1e3, MAX_FILE_BYTES / 1e3 + 1, "kB")
 
 

@@ -13,7 +13,7 @@ HEAD = """# ridelog on a whole machine
 
 Written by `python -m tests.benchmarks.whole_machine --out docs/reference/whole-machine.md` on {day}. It
 builds a disk with Debian 12 (systemd 252) from packages, installs ridelog by the README, boots it, and tries what is
-promised. Nothing here runs against a model of ours but for the instruments: the kernel, systemd, udev, file
+promised. Only the instruments are models: the kernel, systemd, udev, file
 systems and tools are the real ones.
 
 - **UML**: user-mode Linux 6.1. The chip is the kernel's `i2c-stub` on `/dev/i2c-0`, its registers filled 100 times a
@@ -25,7 +25,7 @@ systems and tools are the real ones.
   monitor. The service's watchdog waits 10 min there: without KVM it can be slower than real time on a busy host.
 - **aarch64**: Debian for arm64, by user emulation and on an emulated board.
 
-Times are those of guests on a host that had other work ({cores} cores); no measure of a Pi.
+The times come from guests on a busy host ({cores} cores); they say nothing about a Pi.
 
 | trial | guest | times | |
 | --- | --- | --- | --- |
@@ -63,7 +63,8 @@ def page(reports: Sequence[Report], day: str) -> str:
         if report is None:
             lines.append("\nNot run.\n")
             continue
-        lines.append(f"\n{report.times} times, {report.seconds / 60:.0f} min, at commit {report.commit}"
+        times = f"{report.times} time{'s' * (report.times != 1)}"
+        lines.append(f"\nTried {times}, {report.seconds / 60:.0f} min, at commit {report.commit}"
                      f"{': ' + report.cannot if report.cannot else ''}.\n\n| | | |\n| --- | --- | --- |\n")
         lines += [f"| {cell(check.what)} | {outcome(check)} | {cell(check.figure)} |\n" for check in report.checks]
     return "".join([*lines, NOT_TRIED])

@@ -355,15 +355,15 @@ def _outages(error: int) -> tuple[Case, ...]:
 _GOES_ON = ("the service stays up and `status` says it; rows wait in memory; as soon as the disk takes them each is in "
             "the log, once and in order")
 HAZARDS = (
-    *(Hazard(name, "each kind of change of the disk refused, or all, in one or twelve rounds of the main loop from "
-             "each of thirteen on; half of a refused write stays", _GOES_ON,
+    *(Hazard(name, "the disk refuses one kind of change, or all, in one or twelve rounds of the main loop, from each "
+                   "of thirteen rounds on; half of a refused write stays", _GOES_ON,
              "{rows.total:.0f} rows promised, {lost.total:.0f} lost", disk_refuses, _outages(error), 70)
       for name, error in zip(("disk full (ENOSPC)", "dying card (EIO)", "card turns read-only (EROFS)"), ERRORS,
                              strict=True)),
     Hazard("disk that never comes back", "full, failing or read-only from a round on, to the end of the drive",
            "what was on it stays; waiting and lost rows are counted and reported", "as promised", disk_never_comes_back,
            tuple(product(ERRORS, range(2, 12))), 15),
-    Hazard("fsync that fails once", "the next fsync says that all is well, as Linux does",
+    Hazard("fsync that fails once", "the next fsync reports success, as on Linux",
            "never believed: the rows since the last good one are written again, to another file", "as promised",
            failed_sync, range(3, 22, 2), 2),
     Hazard("outages over and over", "writes or syncs refused in two of each eight rounds",
@@ -386,7 +386,7 @@ HAZARDS = (
     Hazard("little room, exported files there", "the quota or the free room is short",
            "the oldest exported files go, and only as many as needed", "as promised", exported_files_go_first,
            (True, False)),
-    Hazard("little room, nothing exported", "the card shrinks step by step",
+    Hazard("little room, nothing exported", "free space on the card shrinks step by step",
            "raw dumps stop first, then old dumps go, and it is said; a log never goes; then logs wait", "as promised",
            nothing_is_exported, (3000, 1000), 1),
     Hazard("folder under the name of an old file", "a folder called as a dump or a log lies among them",

@@ -214,19 +214,19 @@ def _as_written(records: Sequence[WindowRecord], segments: Iterable[int]) -> Non
 
 
 HAZARDS = (
-    Hazard("killed or cut off while room is made", "all ends after each change of the disk while exported logs go, in "
-           "a kill or with what was not synced in any state", "each log is there with its sidecar or gone with it, "
-           "what is left passes `ridelog verify`, and no lone sidecar remains", "as promised",
-           cut_while_room_is_made, (False, True)),
+    Hazard("killed or cut off while space is freed", "the process is killed, or the power cut, after each change of "
+           "the disk while exported logs are removed; what was not synced is in any state",
+           "each log is there with its sidecar or gone with it, what is left passes `ridelog verify`, and no lone "
+           "sidecar remains", "as promised", cut_while_room_is_made, (False, True)),
     Hazard("a bit flipped in the sidecar of an open log", "at random places; its rows wait for their UTC",
            "every row is kept, with the right UTC or flagged `time_unset`", "{unknown.total:.0f} without UTC",
            flipped_sidecar_of_an_open_part, tuple((seed, 500) for seed in range(4)), 1),
     Hazard("a bit flipped in the sidecar of a finished log", "at random places",
            "`ridelog verify` says so and `ridelog report` does not show it, or nothing that is read has changed",
            "{seen.total:.0f} seen", flipped_sidecar_of_a_finished_log, tuple((seed, 500) for seed in range(4)), 1),
-    Hazard("damage inside an open log", "bits, bytes, sectors, line ends and lengths of a session's open parts are "
-           "others", "the next start keeps every row whose line is as it was, the files pass `ridelog verify`, and "
-           "the place of what was lost stands in the sidecar", "{lost.total:.0f} rows lost, none accepted",
+    Hazard("damage inside an open log", "bits, bytes, sectors, line ends and lengths of a session's open files are "
+           "changed", "the next start keeps every row whose line is as it was, the files pass `ridelog verify`, and "
+           "the sidecar says what was lost", "{lost.total:.0f} rows lost, none accepted",
            damaged_part, tuple((seed, 1000) for seed in range(7)), 1),
     Hazard("damage inside an open log and the file that was made of it", "a cut has left both, and each is damaged",
            "every row that is intact in either is kept, once and in order", "{missing.total:.0f} rows damaged in both",

@@ -570,7 +570,8 @@ HAZARDS = (
     Hazard("stick pulled during a later export", "at every call, with a log that has changed since the first", _AGAIN,
            "as promised", pulled_during_a_repeat),
     Hazard("stick without room", "for none, one, two or three of four files",
-           "the oldest are copied whole, the others are named with the bytes that lack; the next try does the rest",
+           "the oldest are copied whole, the others are named with the bytes that are missing; the next try does the "
+           "rest",
            "as promised", little_room, (0, 1, 2, 3)),
     Hazard("short writes", "a write takes 1 to 100 bytes", "the rest is written", "as promised", few_bytes_at_a_time,
            (1, 7, 100)),
@@ -593,7 +594,7 @@ HAZARDS = (
            "reported, not followed; nothing outside the stick changes", "as promised", prepared_folder,
            tuple(product((hostile_link_to_folder, hostile_link_to_nothing, hostile_pipe, hostile_hard_link),
                          ("ridelog", "own")))),
-    Hazard("odd names on stick and card", "options, line ends, wildcards, commands, bytes that are no text",
+    Hazard("odd names on stick and card", "options, line ends, wildcards, commands, bytes that are not text",
            "left alone, and nothing else goes wrong", "as promised", odd_names, ODD_NAMES),
     Hazard("names of FAT", "every name that is written", "fits FAT: characters, ends, lengths, and case", "as promised",
            names_of_fat),

@@ -16,7 +16,8 @@ from ..shell import run
 SERVICE_S = 1200.0
 
 
-@trial("on aarch64 the wheels of a Pi install, the demo runs, and the service boots and writes rows", "aarch64")
+@trial("on aarch64, pip installs the wheels that a Pi uses, the demo runs, and the service boots and writes rows",
+       "aarch64")
 def aarch64(bench: Bench, report: Report) -> None:
     """Debian for arm64: programs by qemu's user emulation, then a whole board."""
     began_s = time.monotonic()

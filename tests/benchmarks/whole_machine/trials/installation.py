@@ -37,7 +37,7 @@ def install(bench: Bench, report: Report) -> None:
         verified = guest.run("systemd-analyze verify /etc/systemd/system/ridelog.service "
                              "/etc/systemd/system/ridelog-export@.service 2>&1; udevadm verify "
                              "/etc/udev/rules.d/90-ridelog.rules 2>&1 | grep -v 'Unknown command' | head -3", 180).out
-        report.check("systemd-analyze verify has nothing to say of them", "ridelog" not in verified, verified[:300])
+        report.check("systemd-analyze verify reports nothing", "ridelog" not in verified, verified[:300])
 
 
 @trial("an upgrade in place keeps changed settings and puts the new ones beside them; the service goes on with its "
@@ -72,6 +72,6 @@ def upgrade_and_uninstall(bench: Bench, report: Report) -> None:
         left = car.guest.run("ls /etc/systemd/system/ridelog* /etc/udev/rules.d/90-ridelog.rules "
                              "/etc/sysusers.d/ridelog.conf /usr/local/bin/ridelog 2>/dev/null; "
                              "ls /etc/ridelog").out.split()
-        report.check("after uninstall there is left of it", left == ["ridelog.yaml"], left)
+        report.check("left after uninstall", left == ["ridelog.yaml"], left)
         report.check("the logs stay", int(car.guest.must("ls /var/lib/ridelog/*.csv | wc -l")) >= 2)
         report.check("the service is gone", car.guest.run("systemctl is-active ridelog").rc != 0)

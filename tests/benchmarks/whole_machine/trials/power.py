@@ -39,7 +39,7 @@ class Cuts:
         return sum(getattr(outcome, name) for outcome in self.outcomes)
 
 
-@trial("of the rows older than a second none is lost by a power cut, and no damaged row is taken for a good one; "
+@trial("no row older than a second is lost by a power cut, and no damaged row is taken for a good one; "
        "the disk drops what was not flushed, and writes some of it in any order")
 def power_cuts(bench: Bench, report: Report) -> None:
     """Cuts at random moments, also while it boots and repairs, in guests side by side."""
@@ -64,7 +64,7 @@ def power_cuts(bench: Bench, report: Report) -> None:
     report.measure("newer rows that the cuts cost (nothing is promised)", f"{cuts.total('newer_lost')} rows")
 
 
-@trial("the trial above can fail: on a disk that ignores flushes promised rows are lost")
+@trial("the trial above is able to fail: on a disk that ignores flushes, promised rows are lost")
 def power_cuts_on_a_disk_that_lies(bench: Bench, report: Report) -> None:
     """The control."""
     report.times = 2 if bench.quick else 4

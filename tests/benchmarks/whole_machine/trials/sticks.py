@@ -121,7 +121,7 @@ def stick_fat(bench: Bench, report: Report) -> None:
         rc, last = sticks.verify(0)
         report.check("ridelog verify of it", rc == 0, last)
         sticks.do("pull 0")
-        report.check("pulled: status speaks no more of it", sticks.no_notes())
+        report.check("pulled: status no longer mentions it", sticks.no_notes())
         sticks.do("systemctl restart ridelog; sleep 8; plug 0")
         notes = sticks.ready()
         more = int(sticks.do("look 0 'find . -type f | wc -l'"))
@@ -137,7 +137,8 @@ def stick_fat(bench: Bench, report: Report) -> None:
             report.check("journal", False, sticks.journal()[-600:])
 
 
-@trial("a stick that is back within a second is served, every time, and no note of the last time is seen")
+@trial("a stick that is plugged in again within a second is served every time, and the note of the previous time is "
+       "not shown")
 def stick_back_within_a_second(bench: Bench, report: Report) -> None:
     """Pulled when it may be, or early, and back at once."""
     report.times = 3 if bench.quick else 20
@@ -224,7 +225,7 @@ def sticks_of_other_kinds(bench: Bench, report: Report) -> None:
                      == ["mine", "mine"])
 
 
-@trial("of a stick that is pulled in mid-copy nothing counts as exported that is not whole on it; plugged in again it "
+@trial("if a stick is pulled in mid-copy, only files that are whole on it count as exported; plugged in again, it "
        "gets everything")
 def stick_pulled_in_mid_copy(bench: Bench, report: Report) -> None:
     """Pulled after a while that grows, then back."""
@@ -251,7 +252,7 @@ def stick_pulled_in_mid_copy(bench: Bench, report: Report) -> None:
         report.check("pulls after which a row or file on it is torn or corrupt", not wrong,
                      f"{len(wrong)} {wrong[:1] or ''}")
         report.measure("pulls after which ridelog verify says that the export was cut short: export again", unlisted)
-        report.check("status speaks no more of a pulled stick", gone == report.times, f"{gone} of {report.times}")
+        report.check("status no longer mentions a pulled stick", gone == report.times, f"{gone} of {report.times}")
         sticks.do("plug 0")
         notes = sticks.ready()
         report.check("finally everything is on it", len(notes) == 1 and notes[0]["ok"], words(notes))

@@ -109,7 +109,7 @@ def usb_sticks(bench: Bench, report: Report) -> None:
             rc, last = sticks.verify_plugged()
             report.check("ridelog verify of it", rc == 0, last)
             sticks.pull(number)
-            report.check("pulled: status speaks no more of it", sticks.no_notes(120))
+            report.check("pulled: status no longer mentions it", sticks.no_notes(120))
         early = 0
         for number in range(report.times):
             sticks.guest.must("systemctl restart ridelog; sleep 5", 300)
