@@ -23,7 +23,7 @@ class DamperAsymmetry(ForceEffect):
     )
     source = "J. C. Dixon, The Shock Absorber Handbook (2007), chapter 1: ratios of 2 to 3 are usual"
     signature = "the body sits lower while it shakes; upward and downward peaks differ; second harmonics appear"
-    shown_by = "drive single bumps and a rough road, so that the suspension moves fast both ways"
+    shown_by = "drive single bumps and a rough road, so that the suspension moves fast in both directions"
 
     def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
         rebound = 2 * p.rebound_to_bump_ratio / (1 + p.rebound_to_bump_ratio)
