@@ -82,5 +82,5 @@ def test_an_input_that_excites_is_taken(kind: str) -> None:
 
 def test_channels_that_are_sums_of_others_are_refused() -> None:
     noise = np.random.default_rng(1).standard_normal((3000, 2))
-    with pytest.raises(ValueError, match="a sum of others"):
+    with pytest.raises(ValueError, match="a combination of others"):
         find_modes(np.column_stack([noise, noise[:, 0] - 2 * noise[:, 1]]), RATE_HZ)
