@@ -273,7 +273,7 @@ class NmeaDecoder:
             return f"{wrong}: give its antenna a free view of the sky, or replace it"
         return (f"{wrong}. If the date is right, change earliest_date. If today is about "
                 f"{_words_of(day + turns * ROLLOVER_DAYS)}, its week counter wrapped after 1024 weeks: set "
-                f"gps.week_rollovers: {rollovers}, or renew its firmware")
+                f"gps.week_rollovers: {rollovers}, or update its firmware")
 
     @property
     def counts(self) -> dict[str, int]:

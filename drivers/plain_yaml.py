@@ -232,6 +232,6 @@ def _convert(node: yaml.Node, file: str, line: int, kind: type[N]) -> N:
         if not isinstance(key, yaml.ScalarNode):
             raise NotPlainError(key_line, "expected a word as key")
         if key.value in content:
-            raise NotPlainError(key_line, f"expected each key once, {shortened(key.value)} stands here again")
+            raise NotPlainError(key_line, f"expected each key once, found {shortened(key.value)} again")
         content[key.value] = replace(_convert(value, file, key_line, kind), key=key.value)
     return kind(file, line, content)

@@ -303,7 +303,7 @@ ADVICE = {
                                "damage would go unnoticed: switch the checksum on in the receiver",
     (RECEIVER, "damaged"): _DAMAGED,
     (RECEIVER, "malformed"): "its {what} have the right checksum, but a field in them has an impossible value{shown}: "
-                             "renew its firmware, or have it send other sentences ({expected} expected)",
+                             "update its firmware, or have it send other sentences ({expected} expected)",
     (RECEIVER, "receiver_binary"): "it sends {what}, and {expected} expected: switch it to NMEA at this port (RMC and "
                                    "GGA are enough)",
     (RECEIVER, "text"): "whole lines of text come, so the baud rate is right, but they are not NMEA sentences{shown}; "

@@ -254,7 +254,7 @@ class _Pasco(SerialAccelerometer[PascoConfig]):
             raise SettingsError(str(error), "profile") from None
         if not profile.verified and not settings.accept_unverified:
             raise SettingsError(f"expected a verified profile, and {profile.name!r} is not verified on hardware; set "
-                                "accept_unverified: true as well to use it all the same", "profile")
+                                "accept_unverified: true as well to use it anyway", "profile")
 
     def line(self, settings: PascoConfig) -> tuple[str, int]:
         return settings.port, settings.baud

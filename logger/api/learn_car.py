@@ -269,7 +269,7 @@ def _uneven_dampers(car: LearnedCar) -> Iterator[str]:
     uneven = float(np.exp(car.x[at]))
     std = uneven * float(car.std[at])
     if uneven > _SIGMA * std and uneven >= 1:  # such a damper would push the wheel on
-        yield ("The harmonics of wheel hop are stronger than dampers that act in one direction only could cause. "
+        yield ("The harmonics of wheel hop are too strong even for dampers that act in one direction only. "
                "A measured street and ridelog diagnose may show what causes them.")
     elif uneven > _SIGMA * std:
         least = uneven - 2 * std

@@ -299,7 +299,7 @@ class AxleResponse:
         for one in parameters:
             read(vehicle, one.name)
             if one.name.endswith("cg_distance_m") or one.name == "contact_patch_m":
-                raise ValueError(f"{one.name} cannot be found where the road is not known: expected it to be measured")
+                raise ValueError(f"{one.name} cannot be found where the road is not known: expected a measured road")
         structure = structure_of(vehicle)
         self.contact_patch_m = structure.contact_patch_m
         self.behind_m, self._axle = np.unique(structure.behind_m, return_inverse=True)

@@ -80,7 +80,7 @@ def known_car(car: Car) -> KnownCar:
     ValueError for a law that is another one at another place or time, and for effects on the record in time.
     """
     if car.records:
-        raise ValueError(f"{car.records[0].effect.name} acts on the record as it runs and has no linear stand-in: "
+        raise ValueError(f"{car.records[0].effect.name} acts on the record over time and has no linear stand-in: "
                          "expected effects without it here")
     output = Output(car.row, np.zeros(len(car.structure.wheels)), 2)
     if not car.bends_laws:

@@ -136,7 +136,7 @@ def _moved(vehicle: Vehicle, effects: Sequence[Chosen], steps: Mapping[str, floa
             one = others[places[effect]]
             parameter = next((each for each in one.effect.parameters if each.name == leaf), None)
             if parameter is None:
-                raise ValueError(f"{effect} has no number {leaf!r}")
+                raise ValueError(f"{effect} has no parameter {leaf!r}")
             value = one.values[leaf]
             moved = parameter.value(parameter.coordinate(value) + slope_of(parameter, value) * step)
             others[places[effect]] = replace(one, values={**one.values, leaf: moved})

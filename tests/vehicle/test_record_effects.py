@@ -74,7 +74,7 @@ def test_the_body_moves_as_without_them() -> None:
 
 def test_what_takes_a_linear_car_refuses_them() -> None:
     car = compose(CAR, [chosen(Settles(), {"size": 1.0})])
-    with pytest.raises(ValueError, match="settles acts on the record as it runs"):
+    with pytest.raises(ValueError, match="settles acts on the record over time"):
         known_car(car)
     with pytest.raises(ValueError, match="expected a linear car"):
         response_of(car, 100.0)

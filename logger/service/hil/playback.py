@@ -138,12 +138,12 @@ def expected_rows(recording: Wired, config: Config, place: str, receiver: Carrie
     if not isinstance(sensor.kind, SerialAccelerometer):
         known = " or ".join(serial_accelerometers())
         raise BadInput(f"the service's settings: expected the driver {known}, whose bytes a serial "
-                       f"port can bring, found {sensor.driver} (--config FILE names the settings)")
+                       f"port can carry, found {sensor.driver} (--config FILE names the settings)")
     for key, value in (sensor.kind.lines or {}).items() if recording.bridged else ():
         found = sensor.kind.header(sensor.settings).get(key)
         if found != value:
-            raise BadInput(f"the service's settings: expected the {key} {value}, as which the bytes of the "
-                           f"{recording.bridged} are sent, found {found}")
+            raise BadInput(f"the service's settings: expected the {key} {value}, the form in which the "
+                           f"bytes of the {recording.bridged} are sent, found {found}")
     config = wiring.config_for_dump(recording.header, config, None, place)
     instrument = wiring.instrument(config.accelerometer, noise)
     rows = _Rows()

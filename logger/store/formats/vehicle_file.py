@@ -172,7 +172,8 @@ def _read_errors(keys: Mapping[str, Node], vehicle: Vehicle, effects: Sequence[C
     rows = [[node.number(low=-1.0, high=1.0) for node in row.items()] for row in keys["correlations"].items()
             ] if "correlations" in keys else []
     if rows and [len(row) for row in rows] != list(range(len(errors))):
-        raise keys["correlations"].wrong(f"a row for each of {len(errors)} standard errors, of those before it")
+        raise keys["correlations"].wrong(f"a row for each of {len(errors)} standard errors, of one value for each "
+                                         "before it")
     return NumberErrors(errors, tuple(map(tuple, rows)))
 
 

@@ -31,7 +31,7 @@ def force_n(p, travel_m, rate_mps):
                            functions, at="loop", reference=travel_m)]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
-        return (f"a damping that grows with the travel to the power {say('power_ratio')}: "
+        return (f"damping that grows with the travel to the power {say('power_ratio')}: "
                 f"{say('force_n')} at {draft.parameters[0].meaning.removeprefix('at ')}")
 
 

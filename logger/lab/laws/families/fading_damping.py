@@ -35,7 +35,7 @@ class FadingDamping(Family):
         return [self.draft((lost, time), _METHOD, _FUNCTIONS, variant="settling")]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
-        return f"a damping that loses a share of {say('lost_ratio')} during a run, within about {say('time_s')}"
+        return f"damping that falls by a share of {say('lost_ratio')} during a run, within about {say('time_s')}"
 
 
 FAMILY = FadingDamping()

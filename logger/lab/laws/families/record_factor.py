@@ -51,11 +51,11 @@ class RecordFactor(Family):
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         if draft.variant == "pole":
-            return f"a record to which {say('added_ratio')} of it is added below {say('frequency_hz')}"
+            return f"a gain of the record that is larger by {say('added_ratio')} below {say('frequency_hz')}"
         if draft.variant == "rising":
-            return f"a record to which {say('added_ratio')} of it is added above {say('frequency_hz')}"
+            return f"a gain of the record that is larger by {say('added_ratio')} above {say('frequency_hz')}"
         return (f"a record with a resonance at {say('frequency_hz')} of damping ratio {say('damping_ratio')}, which "
-                f"adds {say('added_ratio')} at rest and {say('rate_ratio')} by the rate")
+                f"adds {say('added_ratio')}, and {say('rate_ratio')} in proportion to the frequency")
 
 
 FAMILY = RecordFactor()

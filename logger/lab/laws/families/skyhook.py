@@ -43,7 +43,7 @@ class Skyhook(Family):
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         said = f"{draft.variant} dampers that resist the body's velocity against the ground, {say('sky_n_s_per_m')}"
-        return said if draft.variant == ACTIVE else f"{said}, by at most {say('firmest_n_s_per_m')} of their rate"
+        return said if draft.variant == ACTIVE else f"{said}, at most {say('firmest_n_s_per_m')} times their rate"
 
 
 FAMILY = Skyhook()
