@@ -310,7 +310,7 @@ def verdict_of(parts: list[Compared], refused: list[str], repeat: str) -> str:
             words.append(f"All roads, {window_m:g} m: R2 {found.r2:.2f}, off by {found.mae_m_per_km:.2f} m/km on "
                          f"average, bias {found.bias:+.0%}, {found.within_two:.0%} within two standard errors.")
     if not words:
-        words.append("Too few windows lie on the profiled roads for a figure.")
+        words.append("Too few windows lie on the profiled roads to give a figure.")
     words.append(repeat)
     if refused:
         words.append(f"Not used: {len(refused)}, the first {refused[0]}".rstrip(".") + ".")

@@ -119,7 +119,7 @@ def _may_be_paired(settings: Path, logs: Path) -> bool:
 def summary(result: ExportResult) -> str:
     """What happened, in one line."""
     there = f"{counted(len(result.copied), 'file')} copied ({result.bytes_copied / 1e6:.1f} MB), " \
-            f"{len(result.already_there)} {'was' if len(result.already_there) == 1 else 'were'} there"
+            f"{len(result.already_there)} already there"
     if result.complete and result.unmarked is not None:
         return f"{there}, but this does not count as exported, and the logs stay on the card: {result.unmarked}"
     if result.complete:

@@ -234,8 +234,8 @@ def _shares(pieces: Periodograms, spectrum: Array) -> tuple[Array, Array]:
     off = np.where(np.abs(share - 1) > sure * chance, np.abs(share - 1), 0.0)
     worst = int(off.argmax())
     if off[worst] > most_misfit:
-        raise UnlikeCar(f"from {f_hz[edges[worst]]:.2g} Hz the reading has {share[worst]:.2f} times the power that "
-                        "this car has on a random road, whatever its springs, dampers and masses")
+        raise UnlikeCar(f"from {f_hz[edges[worst]]:.2g} Hz on, the reading has {share[worst]:.2f} times the power that "
+                        "this car could have on a random road with any springs, dampers and masses")
     return np.asarray(f_hz[edges], dtype=np.float64), share
 
 

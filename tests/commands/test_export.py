@@ -50,7 +50,7 @@ def reported(note: Path) -> str:
 
 
 def test_a_person_is_shown_what_was_copied(logs: Path, stick: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    for said in ("ok: 2 files copied (0.0 MB), 0 were there\n", "ok: 0 files copied (0.0 MB), 2 were there\n"):
+    for said in ("ok: 2 files copied (0.0 MB), 0 already there\n", "ok: 0 files copied (0.0 MB), 2 already there\n"):
         assert main(["export", "--from", str(logs), "--to", str(stick)]) == 0
         assert capsys.readouterr().out == said
     assert exported_names(logs) == {"00001-001.csv", "00001-001.json"}
@@ -80,7 +80,7 @@ def test_what_could_not_be_copied_is_reported_with_its_reason(
     first, second = capsys.readouterr().out.splitlines()
     assert first.startswith("WRONG: 2 files NOT copied: ridelog/")
     assert second.startswith("    00001-001.csv and 1 more: ridelog/")
-    assert first.endswith("on the stick: Not a directory. 0 files copied (0.0 MB), 0 were there")
+    assert first.endswith("on the stick: Not a directory. 0 files copied (0.0 MB), 0 already there")
 
 
 def test_a_reason_from_outside_cannot_forge_a_line(
@@ -104,9 +104,9 @@ def test_wrong_use_is_status_2(arguments: list[str]) -> None:
 
 def test_the_note_says_when_the_stick_may_be_pulled_and_goes_with_it(logs: Path, stick: Path, note: Path) -> None:
     assert main(["export", "--from", str(logs), "--to", str(stick), "--note", str(note)]) == 0
-    assert reported(note) == "stick sda1: 2 files copied (0.0 MB), 0 were there; leave it in"
+    assert reported(note) == "stick sda1: 2 files copied (0.0 MB), 0 already there; leave it in"
     assert main(["export", "--unmounted", str(stick), "--note", str(note)]) == 0
-    assert reported(note) == "stick sda1: 2 files copied (0.0 MB), 0 were there; it may be pulled"
+    assert reported(note) == "stick sda1: 2 files copied (0.0 MB), 0 already there; it may be pulled"
     assert main(["export", "--removed", "--note", str(note)]) == 0
     assert not note.exists()
     assert main(["export", "--removed", "--note", str(note)]) == 0

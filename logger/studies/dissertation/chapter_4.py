@@ -320,7 +320,8 @@ def _f4_18(effort: Workload) -> Result:
     alike_sets = [float(np.corrcoef(wanted, one)[0, 1]) for one in found]
     # A slope is a mean of the roads' relative errors with weights that grow as the square of the IRI.
     chance = relative_spread(length_m) * float(np.sqrt((wanted**4).sum()) / (wanted**2).sum())
-    values: tuple[Check, ...] = (*(Value(f"set {number + 1}, IRI found per IRI wanted", 1.0, slope, 0.01 + 3 * chance)
+    values: tuple[Check, ...] = (*(Value(f"set {number + 1}, slope of the IRI found against that wanted", 1.0, slope,
+                                         0.01 + 3 * chance)
                 for number, slope in enumerate(slopes)),
               Statement("correlation, the smaller of both sets", "highly linear", min(alike_sets), least=0.95))
     table = Table("IRI of generated roads", ("published: wanted [m/km] .0f", "set 1 [m/km] .2f", "set 2 [m/km] .2f"),
@@ -461,7 +462,7 @@ def _f4_19(effort: Workload) -> Result:
             Statement("length of the record [m]", f"a range of {window:g} m", float(record.distance_m[-1]),
                       window - 0.1,
                       window, Word.NOT_REPRODUCIBLE),
-            Statement("delay of the rear tires' bump, over wheelbase by speed", "one input for each axle",
+            Statement("delay of the rear tires' bump, over wheelbase / speed", "one input for each axle",
                       behind_s * BUMP_MPS / wheelbase_m, 0.97, 1.03, Word.NOT_REPRODUCIBLE),
             Statement("peak over the bump, over the r.m.s. on the road behind it", "the road's roughness is noise that "
                       "is added", float(np.abs(record.measured_mps2).max()) / road, 3.0, word=Word.NOT_REPRODUCIBLE)])
@@ -570,7 +571,7 @@ def _f4_25(effort: Workload) -> Result:
     rows = tuple((1000 * height, *map(float, row)) for height, row in zip(heights, peaks, strict=True))
     own = _peak(BUMP_HEIGHT_M, BUMP_WIDTH_M)
     verdict = ("As the source says, a higher bump gives a larger peak and a wider one a smaller. The car is linear, "
-               "so the peak is exactly proportional to the height; the text gives no number of the figure. Over the "
+               "so the peak is exactly proportional to the height; the text gives no numbers for the figure. Over the "
                f"bump of 5.5.2 the model peaks at {own / STANDARD_GRAVITY_MPS2:.2f} g, the record on a row of speed "
                "bumps at 0.8703 g (Table 5.5): the real bumps, tires or bump stops are harsher than the model's, and "
                "the text does not show which.")
@@ -594,8 +595,8 @@ def _peak(height_m: float, width_m: float) -> float:
 F4_25 = Study("fig_4_25", "Peak acceleration by height and width of a bump", "Fig 4.25, section 4.4.2",
               "Simulated as in the source: half car of Table 4.2, 16.1 km/h, no roughness, no noise.", _f4_25,
               items=(Item("Fig 4.25", Word.AGREES,
-                          "A higher bump gives a larger peak, a wider one a smaller, as published; the figure has no "
-                          "numbers in the text."),))
+                          "A higher bump gives a larger peak, a wider one a smaller, as published; the text gives no "
+                          "numbers for the figure."),))
 
 
 _BUMP_AT_M_F4_27 = 8.0
@@ -664,7 +665,7 @@ F4_27 = Study("fig_4_27", "Error of the mass by the assumed height and width of 
                      Item("Fig 4.27", Word.BETTER,
                           "A fit of height, width and mass together finds them within a fraction of a per cent; a fit "
                           "of the mass alone has many answers."),
-                     Item("4.4.3 smallest height", Word.MISPRINT, "3 in are 76.2 mm, not 72.2.")))
+                     Item("4.4.3 smallest height", Word.MISPRINT, "3 in is 76.2 mm, not 72.2.")))
 
 
 def _f4_30(effort: Workload) -> Result:
@@ -691,7 +692,7 @@ def _f4_30(effort: Workload) -> Result:
         Picture(Curves("Output", "time [s]", "acceleration [m/s2]", (Line("body", time_s, accel),)),
                 "the simulated response to it"))
     later_s = _blow_s(accel, time_s, ~front) - _blow_s(accel, time_s, front)
-    values = (Statement("delay of the second impact, over wheelbase by speed", "a step as the input of both axles",
+    values = (Statement("delay of the second impact, over wheelbase / speed", "a step as the input of both axles",
                         later_s * BRIDGE_MPS / wheelbase_m, 0.9, 1.1, Word.NOT_REPRODUCIBLE),
               Statement("share of the acceleration's energy within 1 s of the step", "easily located by the response",
                         float(np.sum(accel[(time_s >= front_s) & (time_s < front_s + 1)] ** 2) / np.sum(accel**2)), 0.9,
@@ -781,7 +782,7 @@ F4_31 = Study("fig_4_31", "Mass against the assumed height of a bridge's step", 
                           "Exact at the true height and linear, as published; ridelog finds mass and height together."),
                      Item("4.4.5 height from a known mass", Word.AGREES,
                           "With a known mass the fit gives the step's height, as the text proposes."),
-                     Item("4.4.5 speed", Word.MISPRINT, "30 mph are 48.3 km/h, not m/s.")))
+                     Item("4.4.5 speed", Word.MISPRINT, "30 mph is 48.3 km/h, not m/s.")))
 
 
 def _f4_32(effort: Workload) -> Result:
@@ -844,7 +845,7 @@ def _f4_34(effort: Workload) -> Result:
                   comfort_word(float(found[0][index].max())).replace("_",
                                                                      " ")) for index, section in enumerate(SECTIONS_M))
     table = Table("Largest weighted r.m.s. acceleration", (
-        "section [m] .0f", "published, nearly [m/s2] .1f", "ridelog [m/s2] .2f", f"least of {roads} roads .2f",
+        "section [m] .0f", "published, nearly [m/s2] .1f", "ridelog [m/s2] .2f", f"smallest of {roads} roads .2f",
         "largest .2f", "in words"), rows)
     verdict = (f"Of the same size: up to {found[0][0].max():.2f} m/s2 in 1 m windows beside a published value of "
                "nearly 1.5. The source does not give its road, the initial state of its filter or how it weights 1 m, "
@@ -857,12 +858,12 @@ def _f4_34(effort: Workload) -> Result:
     each, tens = (float(one.max()) for one in found[0])
     quiet = float(np.delete(found[0][1], int(found[0][1].argmax())).max())
     return Result((table,), verdict, (picture,), (
-        *about("Fig 4.34", [Value("largest a_w of a metre, nearly [m/s2]", PRINTED_PEAK_MPS2, each, OF_ONE_SIZE,
+        *about("Fig 4.34", [Value("largest a_w over 1 m, nearly [m/s2]", PRINTED_PEAK_MPS2, each, OF_ONE_SIZE,
                                   Word.NOT_REPRODUCIBLE)]),
-        *about("Fig 4.34", [Statement("largest a_w of a metre [m/s2]", "uncomfortable to very uncomfortable", each,
+        *about("Fig 4.34", [Statement("largest a_w over 1 m [m/s2]", "uncomfortable to very uncomfortable", each,
                                       uncomfortable[0], uncomfortable[1], Word.NOT_REPRODUCIBLE)]),
         *about("Fig 4.35", [
-            Statement("largest a_w of 10 m [m/s2]", "still clear that the bump causes a discomfort", tens,
+            Statement("largest a_w over 10 m [m/s2]", "still clear that the bump causes a discomfort", tens,
                       COMFORT_WORDS[-2][0], word=Word.NOT_REPRODUCIBLE),
             Statement("that over the largest a_w of the other sections", "still clear", tens / quiet, 2.0,
                       word=Word.NOT_REPRODUCIBLE)])))
@@ -900,7 +901,7 @@ def _f4_36(effort: Workload) -> Result:
     # The car is linear: one height is enough for all.
     per_metre = np.array([_peak_f4_36(STEP_M, kmh / 3.6) for kmh in effort.each(speeds.tolist())]) / STEP_M
     peaks = np.outer(heights_m, per_metre)
-    table = Table("Largest a_w of a metre (published as a picture only)", (
+    table = Table("Largest a_w over 1 m (published as a picture only)", (
         "step [mm] .1f", *(f"{kmh:.0f} km/h [m/s2] .2f" for kmh in speeds),
         f"in words at {speeds[-1]:.0f} km/h"), tuple(
         (1000 * height, *row, comfort_word(row[-1]).replace("_", " "))
@@ -921,7 +922,7 @@ def _f4_36(effort: Workload) -> Result:
                "0.8.")
     lines = tuple(Line(f"{1000 * height:.1f} mm", speeds, row) for height, row in zip(heights_m, peaks, strict=True))
     limits = tuple(Line(word.replace("_", " "), speeds, np.full(len(speeds), limit)) for limit, word in comfort_limits)
-    picture = Picture(Curves("Largest a_w of a metre over a step", "speed [km/h]", "a_w [m/s2]", (*lines, *limits)),
+    picture = Picture(Curves("Largest a_w over 1 m at a step", "speed [km/h]", "a_w [m/s2]", (*lines, *limits)),
                       "dots for heights and speeds, and two lines across: comfortable below the green one, a "
                       "noticeable discomfort above the red one")
     return Result((table,), verdict, (picture,), values)
@@ -938,7 +939,7 @@ F4_36 = Study("fig_4_36", "Discomfort of a bridge's step by height and speed", "
               "Simulated as in the source: a step down on a road without roughness; a_w by Wk, per metre.", _f4_36,
               items=(Item("Fig 4.36", Word.NOT_REPRODUCIBLE,
                           "The heights, speeds and limits of the figure are not published; the one published value, "
-                          "from Fig 4.34, has the size of that of ridelog."),))
+                          "from Fig 4.34, is about as large as that of ridelog."),))
 
 STUDIES = (T4_1, T4_2, T4_3, F4_3, F4_16, F4_18, T4_4, F4_19, F4_21, F4_22, F4_25, F4_27, F4_30, F4_31, F4_32, F4_34,
            F4_36)

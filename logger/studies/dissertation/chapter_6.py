@@ -166,7 +166,7 @@ def _rms_t6_1(values: np.ndarray) -> float:
 
 T6_1 = Study("table_6_1", "Mass from speed bumps whose size and speed differ a little from the assumed ones",
              "Table 6.1 (and 6.2), section 6.2.1",
-             "The source measured, and its records were never published. Simulated: the car of Table 4.2, a PS-2119 "
+             "The source's records were never published. Simulated: the car of Table 4.2, a PS-2119 "
              "with steps of 0.01 g, 20 Hz low-pass and a start at 875 kg for the source's method, as in 6.2.1.", _t6_1,
              items=alike(("Table 6.1", "Table 6.2"), Word.NOT_REPRODUCIBLE, "The records were never published; errors "
                          "of that kind follow from a bump and a speed that are a few per cent off."))
@@ -275,8 +275,8 @@ def _rms_t6_3(values: Sequence[tuple[float, ...]]) -> list[float]:
     return [float(value) for value in np.sqrt((np.array(values) ** 2).mean(axis=0))]
 
 
-T6_3 = Study("table_6_3", "Mass from a bridge's steps", "Table 6.3 (and 6.4), section 6.2.2", "The source measured, "
-             "and its records were never published. Simulated: the car of Table 4.2, a PS-2119 with steps of 0.01 g, "
+T6_3 = Study("table_6_3", "Mass from a bridge's steps", "Table 6.3 (and 6.4), section 6.2.2", "The source's records "
+             "were never published. Simulated: the car of Table 4.2, a PS-2119 with steps of 0.01 g, "
              "steps of 38.1 and 12.7 mm on roads of IRI 0, 2 and 5 m/km; the position of a step is also "
              "estimated.", _t6_3,
              items=alike(("Table 6.3", "Table 6.4"), Word.NOT_REPRODUCIBLE, "The records were never published; a flat "
@@ -354,7 +354,8 @@ def _row_t6_5(printed: tuple[int, int, str, str], what: str, factor: float) -> t
 
 T6_5 = Study("table_6_5", "Three revisited places, and the obstacles that would explain them",
              "Table 6.5, section 6.5.3",
-              "The source measured. Simulated: the car of Table 4.2 at the speeds of Table D.1 over a step and a dip "
+              "The source used measured records. Simulated: the car of Table 4.2 at the speeds of Table D.1 over a "
+              "step and a dip "
               "on a flat road, 15 Hz low-pass, weighted with Wk; the worst window of 25 ft, averaged over the "
               "position of the obstacle in its window; random roads for the damage.", _t6_5,
               items=(Item("Table 6.5", Word.NOT_REPRODUCIBLE,
@@ -383,7 +384,7 @@ def _f6_6(effort: Workload) -> Result:
                "figures: r.m.s. acceleration grows with the root of Gd(n0), whatever the length of the road, so the "
                "trendlines are straight and parallel on logarithmic axes; with Eq 4.39 that gives one line through "
                "the origin for each speed, flatter at higher speeds; more mass lowers the acceleration at every "
-               "speed, so a given reading means a rougher road. The published pictures have no numbers in the text. "
+               "speed, so a given reading means a rougher road. The text gives no numbers for the published pictures. "
                "The line holds for long roads of waviness 2; windows of 25 ft scatter about it, and on a road of "
                "another waviness it drifts with speed (6.3.1, Fig 6.11). ridelog estimate is the better relation that "
                "the source asks for.")
@@ -592,8 +593,9 @@ def _f6_16(effort: Workload) -> Result:
          *(comfort_word(one.a_w_per_iri.slope * level).replace("_", " ").replace(" uncomfortable", "")
            for level in (1, 2, 4, 8)),
          COMFORT_WORDS[-2][0] / one.a_w_per_iri.slope) for number, one in enumerate(lines)))
-    verdict = ("Discomfort grows in proportion to roughness, and with speed, as the text says. The published pictures "
-               "have no numbers in the text. For this car a straight line through the origin holds for each speed, "
+    verdict = ("Discomfort grows in proportion to roughness, and with speed, as the text says. The text gives no "
+               "numbers for the published pictures. For this car a straight line through the origin holds for each "
+               "speed, "
                f"because it is linear; from 10 to 70 mph it becomes {per_iri[-1] / per_iri[0]:.1f} times as steep, not "
                "seven times: on a road of waviness 2 the excitation grows with the square root of the speed, 2.6 "
                "times. Most of the rest is the tire, whose contact patch of 250 mm averages out the short waves that "
@@ -622,7 +624,7 @@ F6_16 = Study("fig_6_16", "Comfort by roughness and speed", "Fig 6.16 (and 6.17)
               "weighted with Wk; here 60 roads of 1 km. In addition one road of IRI 5 m/km is simulated in the time "
               "domain.",
               _f6_16, items=alike(("Fig 6.16", "Fig 6.17"), Word.AGREES, "Discomfort grows in proportion to "
-                                  "roughness, and with speed; the text gives no numbers of the figures."))
+                                  "roughness, and with speed; the text gives no numbers for the figures."))
 
 
 PRINTED_MPH = {**dict.fromkeys(range(1, 38), 20), **dict.fromkeys(range(1, 5), 30), **dict.fromkeys((5, 8, 9), 25),
@@ -768,7 +770,7 @@ def _map(title: str, values: dict[int, Array], name: str, top: float) -> Field:
 
 F6_23 = Study("fig_6_23", "37 road segments at their speeds: a map of roughness and one of comfort",
               "Fig 6.23 (6.19 to 6.24, and Table D.1), section 6.5",
-              "The source measured, and its records were never published; nor are the segments' lengths given. "
+              "The source's records were never published, nor are the segments' lengths given. "
               "Simulated: 37 random roads of 183 m, median IRI 2.5 m/km, waviness 1.7, each at its speed of Table D.1; "
               "the car of Table 4.2 with a PS-2119, 15 Hz low-pass, windows of 25 ft.", _f6_23,
               items=(Item("Fig 6.19", Word.NOT_REPRODUCIBLE,

@@ -88,7 +88,7 @@ from logger.vehicle.vehicle import SensorPlace, Vehicle
 
 HOW = ("Simulated: the five-storey building of 5.3 with 1.34 % of damping, pulled aside and released, 75 s at 100 Hz; "
        "a PS-2119 with steps of 0.01 g and a BMA220 with steps of 0.0625 g and 2 % less gain on its top floor. The "
-       "source measured; its records were never published. The duration, 75 s, was chosen so that the r.m.s. is near "
+       "source's records were never published. The duration, 75 s, was chosen so that the r.m.s. is near "
        "the published one; gains and noise of the sensors are assumed.")
 
 
@@ -384,7 +384,8 @@ def _bumps(place_m: np.ndarray) -> np.ndarray:
 
 
 T5_5 = Study("table_5_5", "Resonances of the car on four surfaces", "Table 5.5, section 5.5.1",
-              "The source measured. Simulated: the car of Table 4.2 with a PS-2119, a minute on random roads whose "
+              "The source used measured records. Simulated: the car of Table 4.2 with a PS-2119, a minute on random "
+              "roads whose "
               "roughness was chosen, with four bumps of 5.5.2 on the last one. f1 and f2 are the highest bins of the "
               "summed spectra of equal 2 s segments, within 0.5 to 5 and 7 to 18 Hz.", _t5_5,
               items=(Item("Table 5.5", Word.NOT_REPRODUCIBLE,
@@ -449,7 +450,7 @@ def _f5_22(effort: Workload) -> Result:
                                         printed_largest_g / 2, Word.NOT_REPRODUCIBLE)]),
               *(one for case, row in zip(cases, table.rows, strict=True) for one in _stands_out(case, row)),
               *about(("Fig 5.25", "Fig 5.26"), [Statement(
-                  "delay of the second spike, over wheelbase by speed",
+                  "delay of the second spike, over wheelbase / speed",
                   "the front and the rear tires interact with "
                   "the step in two large spikes", _spikes_apart_s(drives[1][0], delay_s) / delay_s, 0.9, 1.1,
                   Word.NOT_REPRODUCIBLE)]))
@@ -515,7 +516,7 @@ def _picture(case: _Case, alone: Run, sensed: Run) -> Picture:
 
 F5_22 = Study("fig_5_22", "Bump, bridge and road tube: the response of the car, and why a tube is too weak",
               "Fig 5.22 (and 5.25, 5.26, 5.28, 5.29), sections 5.5.2 to 5.5.4",
-              "The source measured, and its records were never published. Simulated: the car of Table 4.2 with a "
+              "The source's records were never published. Simulated: the car of Table 4.2 with a "
               "PS-2119 over each obstacle at its speed, alone and on a road of IRI 2 m/km (the source does not give "
               "the roughness of its roads); the mass is fitted with the obstacle known.", _f5_22,
               items=(Item("Fig 5.22", Word.NOT_REPRODUCIBLE,
