@@ -174,6 +174,7 @@ class Run:
     low_pass         what was found of it; None: nothing
     outside_mps2     r.m.s. of what a model and the sensor differ by outside of the pass band [m/s2]
     left_out         what of its drive is in no run, told of one run of a drive, or is no reading
+    thinned_by       how many samples there were for each one
 
     ValueError for columns of different lengths, or fewer than two samples after the beginning.
     """
@@ -191,6 +192,12 @@ class Run:
     low_pass: LowPass | None = None
     outside_mps2: float = 0.0
     left_out: tuple[LeftOut, ...] = ()
+    thinned_by: int = 1
+
+    @property
+    def of_bench(self) -> int:
+        """Samples that a bench took of a part's force for each one of the run; 0: it is of no part on a bench."""
+        return self.thinned_by if self.past is Past.OF_PART else 0
 
     def __post_init__(self) -> None:
         if len(self.more) != len(self.signals) or any(len(one) != self.count for one in self.more):

@@ -186,7 +186,7 @@ def effects() -> Effects:
     """The physical effects that ridelog knows, by name.
 
     >>> effects()["dry_friction"].title
-    'Coulomb friction in each suspension'
+    'Coulomb friction beside spring and damper'
     """
     return Effects({name: EffectInfo(name, one.title, {p.name: p.meaning for p in one.parameters}, one.signature,
                                      one.shown_by, one.source) for name, one in effect_file.shipped_effects().items()})

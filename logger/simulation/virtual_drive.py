@@ -220,7 +220,7 @@ class SimulatedRuns:
             key = fine_hz, distance.tobytes(), track, is_free
             passage = self._passages[index].get(key)  # another thread may put others in its place at any time
             if passage is None:
-                passage = Passage(track, run.rate_hz, distance, fine_hz, index, is_free)
+                passage = Passage(track, run.rate_hz, distance, fine_hz, index, is_free, run.of_bench)
                 kept = [*({key: passage} | self._passages[index]).items()][:_KEPT_PASSAGES]
                 steps = np.cumsum([len(one.way.distance_m) for _, one in kept])
                 self._passages[index] = dict(kept[: int(np.searchsorted(steps, _KEPT_STEPS, "right"))])
@@ -383,7 +383,8 @@ def response(
 
     ValueError for effects under which no such car, or no such motion, is possible.
     """
-    passage = Passage(track, rate_hz, motion.distance_m, steps_hz(car.vehicle) if track.timed else FINE_RATE_HZ)
+    passage = Passage(track, rate_hz, motion.distance_m, steps_hz(car.vehicle) if track.timed else FINE_RATE_HZ,
+                      of_bench=int(car.structure.held))
     columns = {SENSOR: _accelerations(car, passage)}
     if more := {name: output for name, output in outputs.items() if name != SENSOR}:
         columns |= dict(zip(more, observed(car, passage, list(more.values())).T, strict=True))
@@ -397,7 +398,8 @@ def _accelerations(car: Car, passage: Passage) -> Array:
     with np.errstate(over="ignore", invalid="ignore"):  # what grows without bound is refused below
         accel = recorded(car, passage)
         if car.bends_laws:
-            finer = recorded(car, Passage(passage.track, passage.rate_hz, passage.distance_m, 2 / passage.step_s))
+            finer = recorded(car, Passage(passage.track, passage.rate_hz, passage.distance_m, 2 / passage.step_s,
+                                          of_bench=int(car.structure.held)))
             allowed = max(_NO_MOTION_MPS2, _STEPS_MATTER * float(np.sqrt(np.mean(finer**2))))
             if not np.sqrt(np.mean((accel - finer) ** 2)) <= allowed:
                 raise ValueError("its effects are too strong for its masses: they would need steps shorter than "

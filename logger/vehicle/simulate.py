@@ -79,7 +79,9 @@ class Passage:
     frequencies, for the last few places that wheels stood at; everything linear behind the body, down to the recorder's
     filter and the choice of one step in ten, is one product in frequency; and the motions of the last few bodies are
     held as well, since many a sensor is tried on one body. The recorder's filter passes what lies below 0.38 of its
-    rate within 0.001 dB and lets nothing above half its rate through (80 dB down), without delay.
+    rate within 0.001 dB and lets nothing above half its rate through (80 dB down), without delay. A test bench samples
+    the force of a part with the travel, at one instant, and a friction that turns round between two samples is in the
+    record as it stands: that filter comes behind the bench's samples, where they are thinned.
 
     track         the road, or the rig
     rate_hz       samples a second
@@ -88,6 +90,7 @@ class Passage:
     run           which one it is of the runs that are looked at together, from 0 on
     is_free       it begins at the first sample, in any state (``begun_with``): nothing is known of what was before.
                   For the recorder's filter the record is continued there by its mirror image about the first sample
+    of_bench      samples that a bench took for each one that was kept; 0: no bench did
 
     ValueError unless there are two or more finite distances.
     """
@@ -97,12 +100,13 @@ class Passage:
     not at all."""
 
     def __init__(self, track: WheelTracks, rate_hz: float, distance_m: Array, fine_hz: float = FINE_RATE_HZ,
-                 run: int = 0, is_free: bool = False) -> None:
+                 run: int = 0, is_free: bool = False, of_bench: int = 0) -> None:
         if distance_m.ndim != 1 or len(distance_m) < 2 or not np.isfinite(distance_m).all():
             raise ValueError("expected two or more finite distances")
         self.track, self.rate_hz, self.distance_m = track, rate_hz, distance_m
         self.count = len(distance_m)
-        self.steps = max(1, int(np.ceil(fine_hz / rate_hz - _EVEN)))
+        self._of_bench, each = of_bench, max(of_bench, 1)
+        self.steps = each * max(1, int(np.ceil(fine_hz / (rate_hz * each) - _EVEN)))
         self.step_s = 1 / (rate_hz * self.steps)
         self._lead = min(round(APPROACH_S * rate_hz), self.count) if is_free else round(APPROACH_S * rate_hz)
         self._mirrored = self._lead if is_free else 0
@@ -116,9 +120,9 @@ class Passage:
         self._way = Way(way_m, np.asarray((np.arange(len(way_m)) - before * self.steps) * self.step_s), run)
         coarse = len(way) + self._mirrored + round(_REST_S * rate_hz)
         self._coarse = smooth_length(coarse)
-        f_hz = np.arange(self._coarse // 2) * rate_hz / self._coarse
+        f_hz = np.arange(self._coarse * (self.steps if of_bench else 1) // 2) * rate_hz / self._coarse
         self._s = np.asarray(2j * np.pi * f_hz, dtype=complex)
-        self._recorder = _recorder(self._coarse, self.steps)
+        self._recorder = _recorder(self._coarse, of_bench or self.steps)
         self._known: dict[tuple[Hashable, ...], tuple[Array, Array]] = {}
         self._bodies: dict[Hashable, Complex] = {}
         self._beginnings: dict[Hashable, Any] = {}
@@ -138,7 +142,7 @@ class Passage:
         """Its first samples."""
         if (found := self._cuts.get(count)) is None:
             found = self._cuts[count] = Passage(self.track, self.rate_hz, self.distance_m[:count], 1 / self.step_s,
-                                                self._way.run, self._mirrored > 0)
+                                                self._way.run, self._mirrored > 0, self._of_bench)
         return found
 
     def begun_with(self, state: Array) -> Passage:
@@ -207,13 +211,19 @@ class Passage:
     def _transform(self, fine: Array) -> Complex:
         if mirrored := self._mirrored * self.steps:
             fine = np.concatenate([2 * fine[..., :1] - fine[..., mirrored:0:-1], fine], axis=-1)
-        return np.asarray(np.fft.rfft(fine, self._coarse * self.steps)[..., : len(self._s)] * self._recorder)
+        found = np.fft.rfft(fine, self._coarse * self.steps)[..., : len(self._s)]
+        return np.asarray(found if self._of_bench else found * self._recorder)
 
     def _kept(self, transform: Complex, factor: Callable[[Complex], Complex]) -> Array:
         if transform.ndim == 1:
             behind = transform * factor(self._s)
         else:
             behind = np.concatenate([transform[:1] * factor(self._s), transform[1:]])
+        if self._of_bench:
+            sampled = np.fft.irfft(behind, self._coarse * self.steps)[..., :: self.steps // self._of_bench]
+            if self._of_bench == 1:
+                return np.asarray(sampled[..., self._lead : self._lead + self.count])
+            behind = np.fft.rfft(sampled)[..., : len(self._recorder)] * self._recorder
         return np.fft.irfft(behind, self._coarse)[..., self._lead : self._lead + self.count]
 
     def sampled(self, fine: Array) -> Array:

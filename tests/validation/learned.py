@@ -1,6 +1,7 @@
 """The part "off the list" of the examination: laws that ``ridelog learn`` finds for what no effect of the list is.
 
     python -m tests.validation.learned                                  the whole of it: hours
+    python -m tests.validation.learned --cases 1 --minutes 10            what ten minutes reach, kinds mixed
     python -m tests.validation.learned --kind flat_spot --cases 3
     python -m tests.validation.learned --kind none --kind listed --cases 10
     python -m tests.validation.learned --release                         what is published
@@ -22,6 +23,9 @@ import json
 import tempfile
 from collections.abc import Iterator, Sequence
 from pathlib import Path
+from time import monotonic
+
+import numpy as np
 
 from .cases.kept_back import KeptBack, write_kept_back
 from .cases.random_case import case
@@ -48,6 +52,7 @@ def main() -> int:
     parser.add_argument("--cases", type=int, metavar="N",
                         help=f"of each kind (default: {COUNTS[next(iter(RIGHT))]}, of {NONE} and {LISTED} "
                              f"{COUNTS[NONE]})")
+    parser.add_argument("--minutes", type=float, default=np.inf, help="no case is begun later")
     add_seed_options(parser)
     parser.add_argument("--results", type=Path, default=ROOT / "build" / "learned.jsonl")
     parser.add_argument("--report-only", action="store_true", help="of the results that are there")
@@ -56,11 +61,11 @@ def main() -> int:
         questions = planned(options.kind or KINDS, options.cases, first_seed(options), options.release)
     except ValueError as error:
         parser.error(str(error))
-    known = read_results(options.results)
+    known, begun_s = read_results(options.results), monotonic()
     if not options.report_only:
         with appended(options.results) as file:
             for question in questions:
-                if question not in known:
+                if question not in known and monotonic() - begun_s < 60 * options.minutes:
                     known[question] = record = put(question)
                     file.write(json.dumps(record) + "\n")
                     file.flush()
@@ -121,7 +126,7 @@ def judged(given: KeptBack, said: Record) -> Record:
     before = compared(given.vehicle, given.kept)
     found: Record = {"before": before["error"], "before_refitted": before["refitted"]["error"],
                      "without_drift": before["error_without_drift"]}
-    if said["family"] is None and instead_of_law(said) is None:
+    if said["family"] is None and not said["verdict"]:
         return found
     vehicle = given.vehicle
     laws = [] if said["family"] is None else [str(law_of(given))]
@@ -147,17 +152,11 @@ def family(record: Record) -> str | None:
     return record["said"]["family"] if record["said"] else None
 
 
-def instead_of_law(said: Record) -> str | None:
-    """The known effect that ``learn`` names in the place of a law, as one to be added; None: none."""
-    named_instead = said["family"] is None and said.get("refused") and said.get("nearest")
-    return said["nearest"]["effect"] if named_instead else None
-
-
 def meaning(record: Record) -> str | None:
-    """The family of the law; where none was learned, the known effect that is named in its place, or, where a drifting
-    sensor is what was hidden, the drift that was said to be removed. None: nothing was said."""
-    if record["said"] and (instead := instead_of_law(record["said"])):
-        return instead
+    """The family of the law; where none was learned, the most certain of the known effects that are named in its place,
+    or, where a drifting sensor is what was hidden, the drift that was said to be removed. None: nothing was said."""
+    if record["said"] and family(record) is None and record["said"]["verdict"]:
+        return str(record["said"]["verdict"][0])
     if record["said"] and family(record) is None and RIGHT[record["kind"]].meanings == (DRIFT,):
         return REMOVED_DRIFT if record["said"]["removed"]["drift"]["error_power_share"] > 0 else None
     return family(record)

@@ -568,7 +568,7 @@ def thinned_runs(runs: Sequence[Run], vehicle: Vehicle | None = None) -> list[Ru
     def fewer(one: Run, samples: Array) -> Array:
         return resampled(samples, factor) if one.timed else thinned(samples, factor)
 
-    return [replace(one, rate_hz=one.rate_hz / factor, measured_mps2=fewer(one, one.measured_mps2),
+    return [replace(one, rate_hz=one.rate_hz / factor, thinned_by=factor, measured_mps2=fewer(one, one.measured_mps2),
                     distance_m=one.distance_m[::factor], speed_mps=one.speed_mps[::factor],
                     facts=replace(one.facts, step_mps2=None), usable=_thinned_marks(one.usable, factor),
                     more=np.array([fewer(one, samples) for samples in one.more]) if one.signals else one.more)

@@ -435,9 +435,9 @@ def forces_section(forces: ForceMap) -> Detail:
           for title, x_name, curve, factor in (
               (_titled("By rate of the suspensions", forces.by_rate), "extension rate [m/s]", forces.by_rate, 1.0),
               (_titled("By travel of the suspensions", forces.by_travel), "extension [mm]", forces.by_travel, 1000.0))),
-        Hint("The force in each suspension, in addition to a linear spring or damper, that would explain the residual, "
-             "with its standard error. A positive force pulls body and wheel together; compression is left, extension "
-             "right. Distrust a curve that explains little of the residual.")])
+        Hint("The force, in addition to a linear spring or damper, that would explain the residual, with its standard "
+             "error. A positive force pulls both ends together; compression is left, extension right. Distrust a curve "
+             "that explains little of the residual.")])
 
 
 def _alignment(found: LabComparison) -> Detail:

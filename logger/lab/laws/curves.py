@@ -8,7 +8,7 @@ each of them counts. Beyond the motions of the runs curves stay what they are th
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -86,8 +86,13 @@ class CurveFamily(Family):
         usual = reach(self.usual_share)
         size_n = self.tried * getattr(context.vehicle.front, self.answers) * usual
         return [self._power(usual, 2 * reach(self.reach_share), size_n),
-                *(self._free(variant, [reach(share) for share in shares], size_n)
-                  for variant, shares in _POINTS.items())]
+                *(self.free(variant, [reach(share) for share in shares], size_n)
+                  for variant, shares in _POINTS.items()), *self.more_drafts(context, reach, size_n)]
+
+    def more_drafts(self, context: LawContext, reach: Callable[[float], float], size_n: float) -> list[Draft]:
+        """Further laws; ``reach`` gives the motion by the share of the time, ``size_n`` is the force that a search
+        begins with."""
+        return []
 
     def is_straight(self, draft: Draft, found: Chosen, sigma: float) -> bool:
         if draft.variant == "power":
@@ -119,7 +124,7 @@ def force_n(p, at):
                                 "exponent"))
         return self._draft("power", "grows with a power of", parameters, functions, reference, ())
 
-    def _free(self, variant: str, knots: Sequence[float], size_n: float) -> Draft:
+    def free(self, variant: str, knots: Sequence[float], size_n: float) -> Draft:
         """A force that follows a smooth curve through points on either side of rest."""
         places = sorted({sign * rounded(one) for one in knots if one for sign in (-1, 1)})  # beside rest, which is one
         names = {one: f"force_{number}_n" for number, one in enumerate(places, 1)}

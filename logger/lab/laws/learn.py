@@ -6,7 +6,8 @@ families of laws are searched as effects are, by the same screening, fits and ev
 on top of the known ones: every number counts, so that a curve has to be worth its points. Known effects are sought on
 top of the better of the two, where it leaves something. Where known effects explain everything, a law replaces them
 only by decisive evidence. A law whose numbers mean nothing is refused, and the next one is tried; one in whose place a
-known effect explains more is refused for that effect.
+known effect explains more is refused for that effect. Of a part on its bench known forces come before what changes any
+force, as a sensor does: that imitates some of any law.
 
 A law that was fitted may say nothing. Problem: what no known effect explains, some law always explains a little better
 than others. The evidence counts its numbers; it does not ask whether they mean anything. Solution: a law that was
@@ -23,7 +24,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from logger.lab.diagnosis import LabDiagnosis, assess, exceeds_noise, search_effects
+from logger.lab.diagnosis import LabDiagnosis, assess, exceeds_noise, obstacles_of, search_effects
 from logger.lab.laws.draft import LEARNED, Draft, Family, LawContext
 from logger.lab.likelihood.noise_floor import SURE_SIGMA
 from logger.lab.likelihood.posterior import Posterior, State
@@ -190,11 +191,17 @@ def learn(posterior: Posterior, effects: Mapping[str, Effect], families: Mapping
     """Learn a law.
 
     effects     the known effects that are searched first, by name
-    known       all that there are, by name, with those that no search tries unasked: a law may nearly be one of them
+    known       all that there are, by name, with those that are sought last and those that no search tries unasked: a
+                law may nearly be one of them
 
     ValueError where the vehicle lacks what an effect needs.
     """
     search, selection = search_effects(posterior, effects, present, progress)
+    last = {name: one for name, one in known.items() if one.sought_last and name not in effects}
+    last = {name: one for name, one in last.items() if name not in obstacles_of(posterior, last, present)}
+    if last and exceeds_noise(selection.now):
+        search, selection = search.with_more(selection, [*last.values()])
+        effects = {**effects, **last}
     laws = FamilySearch(search, selection, families, known)
     law = laws.best()
     diagnosis = assess(posterior, effects, present, search, selection) if law is None else None
@@ -227,6 +234,15 @@ class FamilySearch:
         """The first refusal for a known effect, which is the better answer, else the first one."""
         return next((one for one in self.refused.values() if one.known), next(iter(self.refused.values()), None))
 
+    @property
+    def _known_forces(self) -> list[Effect]:
+        """Of a part the effects that are forces; of a car all of them."""
+        return [one for one in self.search.effects if isinstance(one, ForceEffect) or not self._is_part]
+
+    @property
+    def _is_part(self) -> bool:
+        return self.selection.before.posterior.vehicle.model == "component"
+
     def best(self) -> Law | None:
         """The law with the most evidence, alone or with known effects; None where known effects without one have more,
         or one of them explains more in its place. Where the residual is no louder than the noise nothing is missing,
@@ -234,13 +250,20 @@ class FamilySearch:
         now, before = self.selection.now, self.selection.before
         unexplained = exceeds_noise(now)
         found = [alone := self._found_on(before, unexplained or now is not before)]
-        if unexplained and now is not before and (alone is None or exceeds_noise(alone.now)):
-            found.append(self._found_on(now, True))
+        forces = now
+        for one in now.effects[self.search.present:]:
+            if one.effect not in self._known_forces:
+                forces = self.search.without(forces, one.effect.name)
+        if (unexplained or forces is not now) and forces is not before and (alone is None or exceeds_noise(alone.now)):
+            found.append(self._found_on(forces, True))
         least = now.score - (0.0 if unexplained else DECISIVE)
+        wholes: list[Selection] = []
         for one in sorted((one for one in found if one is not None), key=lambda one: one.now.score):
-            whole = self._with_known(one)
-            if whole is not None and whole.now.score < least:
-                return self._law(whole)
+            if (not wholes or exceeds_noise(wholes[-1].now)) and (whole := self._with_known(one)) is not None:
+                wholes.append(whole)
+        for whole in sorted(wholes, key=lambda one: one.now.score):
+            if whole.now.score < least and (law := self._law(whole)) is not None:
+                return law
         return None
 
     def _found_on(self, base: Baseline, any_family: bool) -> Selection | None:
@@ -248,8 +271,7 @@ class FamilySearch:
         context = LawContext(base.posterior, base.state)
         drafts = {draft.effect: draft for family in self.families.values() if any_family or family.stands_out
                   for draft in family.drafts(context) if draft.key not in self.refused
-                  and (family.stands_out or isinstance(draft.effect, ForceEffect)
-                       or context.vehicle.model != "component")}
+                  and (family.stands_out or isinstance(draft.effect, ForceEffect) or not self._is_part)}
         self.drafts.update(drafts)
         search = replace(self.search, effects=[*drafts], present=len(base.effects), _promising=set(), _rivals={},
                          effort=replace(self.search.effort, effects=1))
@@ -276,9 +298,11 @@ class FamilySearch:
         not needed beside these."""
         if not exceeds_noise(found.now):
             return found
-        law = next(one.effect for one in found.now.effects if one.effect in self.drafts)
-        search = replace(self.search, effects=[*self.search.effects, law], _promising=set(), _rivals=dict(found.rivals))
-        whole = search.go_on(found)
+        law, whole = next(one.effect for one in found.now.effects if one.effect in self.drafts), found
+        for effects in (self._known_forces, self.search.effects):
+            if whole is found or (exceeds_noise(whole.now) and len(effects) > len(self._known_forces)):
+                search = replace(self.search, effects=[*effects, law], _promising=set(), _rivals=dict(whole.rivals))
+                whole = search.go_on(whole)
         return whole if law.name in whole.gains else None
 
     def _law(self, found: Selection) -> Law | None:

@@ -14,8 +14,8 @@ from logger.vehicle.effect import Chosen, ForceEffect
 from logger.vehicle.laws import MotionLaw, Seen, linear
 from logger.vehicle.uncertain import NumberErrors
 
-_AXES = {"rate": ("rate_mps", "suspension rate [m/s], positive in extension"),
-         "travel": ("travel_m", "suspension travel [m], positive in extension"),
+_AXES = {"rate": ("rate_mps", "rate [m/s], positive in extension"),
+         "travel": ("travel_m", "travel [m], positive in extension"),
          "deflection": ("deflection_m", "tire deflection from rest [m], positive in extension")}
 _STEP = 1e-4  # of a standard error, over which derivatives are taken
 _LOOP_SHARES, _LOOP_HZ, _LOOP_TURNS, _LOOP_STEPS = (0.5, 0.9, 0.99), 1.4, 3, 200
@@ -70,7 +70,7 @@ def _loops(draft: Draft, found: Chosen, context: LawContext) -> Curves | None:
                       for t, states in zip(time_s, _remembered(law, seen, time_s), strict=True)]
         last = slice(-_LOOP_STEPS - 1, None)
         lines.append(Line(f"{1000 * way_m:.3g} mm", travel[last], force[last]))
-    return Curves(draft.title, "suspension travel [m], back and forth at body bounce", "force [N]", tuple(lines))
+    return Curves(draft.title, "travel [m], back and forth", "force [N]", tuple(lines))
 
 
 def _remembered(law: MotionLaw, seen: Callable[[float, Sequence[float]], Seen], time_s: Array) -> Array:

@@ -13,10 +13,10 @@ from logger.vehicle.laws import CornerLaws, Stribeck
 
 
 class DryFriction(ForceEffect):
-    title = "Coulomb friction in each suspension"
+    title = "Coulomb friction beside spring and damper"
     parameters = (
         Parameter("friction_force_n", 60.0, 0.0, 2000.0, 0.0, Scale.LINEAR, (20.0, 60.0, 180.0),
-                  "of each suspension, front and rear alike"),
+                  "of each suspension, or of the part"),
         Parameter("transition_velocity_m_per_s", 0.02, 0.0, 0.2, None, Scale.LINEAR, (0.0, 0.003, 0.02),
                   "rate at which the friction reaches 76 % of its force, tanh(1); 0: at once", default=0.0,
                   step=0.0003),

@@ -37,10 +37,10 @@ def rates(p: Any, seen: Seen) -> tuple[Any]:
 
 
 class Hysteresis(ForceEffect):
-    title = "friction in each suspension that yields before it slides (Bouc-Wen)"
+    title = "friction that yields before it slides (Bouc-Wen)"
     parameters = (
         Parameter("yield_force_n", 100.0, 0.0, 5000.0, 0.0, Scale.LINEAR, (30.0, 150.0),
-                  "at which each suspension slides"),
+                  "at which it slides"),
         Parameter("yield_travel_m", 0.002, 0.0001, 0.05, None, Scale.LOG, (0.0005, 0.004),
                   "over which the initial stiffness would reach that force"),
         Parameter("sharpness_ratio", 1.0, 0.2, 10.0, None, Scale.LOG, (0.5, 2.0),

@@ -13,10 +13,10 @@ from logger.vehicle.laws import CornerLaws
 
 
 class TopMountCompliance(ForceEffect):
-    title = "a rubber mount in series with each damper"
+    title = "a rubber mount in series with the damper"
     parameters = (
         Parameter("mount_stiffness_n_per_m", 2e5, 5e3, 1e8, float("inf"), Scale.RECIPROCAL, (6e4, 3e5, 1.5e6),
-                  "of the mount of each damper"),
+                  "of the mount"),
         AXLE,
     )
     source = "J. C. Maxwell's series of spring and damper; J. C. Dixon, The Shock Absorber Handbook (2007), chapter 1"

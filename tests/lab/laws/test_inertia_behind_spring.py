@@ -81,16 +81,18 @@ def test_geared_rigidly_it_has_the_kinetic_energy_of_the_travel() -> None:
 @pytest.mark.parametrize("by_rate", [0.0, 0.1])
 def test_turbulence_takes_energy_by_the_cube_of_the_speed(by_rate: float) -> None:
     """Held still, the column swings on its spring: d(b y'^2 / 2 + k y^2 / 2)/dt = -b (e |y'|^3 + 2 z w y'^2)."""
-    effect = draft_of("sprung").effect
-    assert isinstance(effect, ForceEffect)
+    draft = draft_of("sprung")
+    assert isinstance(draft.effect, ForceEffect)
+    reach_m = float(draft.functions.partition("REACH_M = ")[2].split()[0])
     p = SimpleNamespace(stiffness_n_per_m=STIFFNESS_N_PER_M, frequency_hz=HZ, square_per_m=200.0, damping_ratio=by_rate)
-    motion, = effect.laws(p, linear(1000.0)).motions
+    motion, = draft.effect.laws(p, linear(1000.0)).motions
     assert motion.rates is not None
     omega = 2 * np.pi * HZ
     inertance_kg = STIFFNESS_N_PER_M / omega**2
     for y_m, y_mps in ((0.01, 0.3), (-0.02, -0.1), (0.0, 0.5)):
-        seen = Seen(*[0.0] * 10, memory=(y_m, y_mps))
-        speed_mps, accel_mps2 = motion.rates(motion.p, seen)
+        seen = Seen(*[0.0] * 10, memory=(y_m / reach_m, y_mps / (reach_m * omega)))
+        speed_mps, accel_mps2 = (reach_m * one for one in motion.rates(motion.p, seen))
+        accel_mps2 *= omega
         power_w = inertance_kg * y_mps * accel_mps2 + STIFFNESS_N_PER_M * y_m * speed_mps
         lost_w = inertance_kg * (200.0 * abs(y_mps)**3 + 2 * by_rate * omega * y_mps**2)
         assert power_w == pytest.approx(-lost_w)

@@ -7,9 +7,8 @@ import pytest
 
 from logger.chart_data import Curves
 from logger.lab.laws.draft import LawContext
-from logger.lab.laws.families.friction_with_memory import FAMILY as FRICTION
 from logger.lab.laws.families.spring_with_memory import FAMILY as RUBBER
-from logger.lab.laws.picture import picture
+from logger.lab.laws.picture import _LOOP_HZ, picture
 from logger.vehicle.effect import chosen
 from logger.vehicle.uncertain import NumberErrors
 
@@ -34,9 +33,9 @@ def test_a_rubber_that_has_no_time_to_creep_is_a_spring() -> None:
         assert slope == pytest.approx(8000.0, rel=0.03)
 
 
-def test_friction_with_a_memory_draws_a_loop_between_its_limits() -> None:
-    found = drawn(FRICTION, yield_force_n=150.0)
-    largest = max(found.lines, key=lambda line: float(np.ptp(line.x)))
-    assert float(np.abs(largest.y).max()) == pytest.approx(150.0, rel=0.05)
-    area = abs(float(np.trapezoid(largest.y, largest.x)))
-    assert area > 150.0 * float(np.ptp(largest.x))  # of 2 F times the way to and fro, most
+def test_a_rubber_that_creeps_as_fast_as_it_is_moved_draws_a_loop() -> None:
+    """A branch of Maxwell loses pi k X^2 w T / (1 + w^2 T^2) a turn."""
+    found = drawn(RUBBER, stiffness_n_per_m=8000.0, creep_time_s=1 / (2 * np.pi * _LOOP_HZ))
+    for line in found.lines:
+        half_m = float(np.ptp(line.x)) / 2
+        assert abs(float(np.trapezoid(line.y, line.x))) == pytest.approx(np.pi * 8000.0 * half_m**2 / 2, rel=0.02)

@@ -20,14 +20,14 @@ from logger.vehicle.effect import Effect, chosen
 
 from ...support.drives.part_bench import Array, fitted_error, force_of, moved, write_bench, write_part
 
-FORCE_N, OVER_M, POWER, RATIO, PLAY_M, STIFFNESS, DAMPING = 400.0, 0.002, 3.0, 1.6, 0.0005, 2000.0, 300.0
+FORCE_N, OVER_M, POWER, PLAY_M, STIFFNESS, DAMPING = 400.0, 0.002, 3.0, 0.0005, 2000.0, 300.0
 
 
-def true_force(place_m: Array, ratio: float, play_m: float, rate_mps: float) -> Array:
+def true_force(place_m: Array, play_m: float, rate_mps: float) -> Array:
     """Its equations as its docstring has them: shortening is a negative force."""
     def rates(_t: float, _x: float, v: float, state: list[float]) -> list[float]:
         s = (state[0] - min(max(state[0], -play_m), play_m)) / OVER_M
-        return [v - (rate_mps if s > 0 else -rate_mps) * abs(s * (ratio if s < 0 else 1.0)) ** POWER]
+        return [v - (rate_mps if s > 0 else -rate_mps) * abs(s) ** POWER]
 
     def force(x: Array, v: Array, s: Array) -> Array:
         return STIFFNESS * x + DAMPING * v + FORCE_N * (s[0] - np.clip(s[0], -play_m, play_m)) / OVER_M
@@ -69,14 +69,12 @@ def test_what_nobody_knows_of_its_beginning_pulls_no_harder_than_it_slides(tmp_p
     assert 0.8 * FORCE_N < np.abs(found - linear_n).max() < 1.5 * FORCE_N
 
 
-@pytest.mark.parametrize(("variant", "ratio", "play_m"), [
-    ("alike", 1.0, 0.0), ("by direction", RATIO, 0.0), ("with play", 1.0, PLAY_M)])
-def test_it_is_the_force_of_its_equations(variant: str, ratio: float, play_m: float, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("variant", "play_m"), [("alike", 0.0), ("with play", PLAY_M)])
+def test_it_is_the_force_of_its_equations(variant: str, play_m: float, tmp_path: Path) -> None:
     place_m = moved(1, 8.0, 0.02, 6.0)
     found, linear_n, rate_mps = predicted(tmp_path, place_m, variant, {
-        "sliding_force_n": FORCE_N, "yield_travel_m": OVER_M, "power_ratio": POWER, "play_m": play_m,
-        "lengthening_ratio": ratio})
-    true_n = true_force(place_m, ratio, play_m, rate_mps)
+        "sliding_force_n": FORCE_N, "yield_travel_m": OVER_M, "power_ratio": POWER, "play_m": play_m})
+    true_n = true_force(place_m, play_m, rate_mps)
     kept = slice(100, -50)
     assert np.std((found - true_n)[kept]) < 0.01 * np.std((linear_n - true_n)[kept])
 

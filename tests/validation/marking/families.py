@@ -25,7 +25,7 @@ NAMES: dict[str, frozenset[str]] = {
     BY_RATE: frozenset({"force_by_rate"}),
     BY_BOTH: frozenset({"damping_by_travel"}),
     BY_TIRE: frozenset({"tire_force"}),
-    FRICTION: frozenset({"friction_with_memory"}),
+    FRICTION: frozenset({"hysteresis"}),
     RUBBER: frozenset({"spring_with_memory"}),
     PLAY: frozenset({"damper_backlash", "sliding_behind_spring"}),
     HEAT: frozenset({"damper_heat"}),
@@ -37,13 +37,9 @@ NAMES: dict[str, frozenset[str]] = {
     PROFILE: frozenset({"smoothed_profile"}),
     SKY: frozenset({"skyhook"}),
     BY_SPEED: frozenset({"changing_with_speed"}),
-    CHANGE: frozenset({"changing_gain", "changing_stiffness", "fading_damping"}),
+    CHANGE: frozenset({"changing_gain", "changing_with_time"}),
 }
-"""What ``ridelog learn`` calls the families of each meaning."""
-
-KNOWN: dict[str, frozenset[str]] = {FRICTION: frozenset({"hysteresis"})}
-"""Known effects of each meaning that no search tries unasked: ``learn`` names them in the place of a law."""
-
+"""What ``ridelog learn`` calls the families of each meaning, or the effect of the list that it names in their place."""
 
 @dataclass(frozen=True)
 class Right:
@@ -91,4 +87,4 @@ PHASES_OF_THEIR_OWN = frozenset({"wheel_imbalance", "engine_vibration", "flat_sp
 def named(kind: str, family: str | None) -> bool:
     """Whether a family, or a known effect in its place, is right for a hidden effect. KeyError: not an effect off the
     list."""
-    return any(family in NAMES[meaning] | KNOWN.get(meaning, frozenset()) for meaning in RIGHT[kind].meanings)
+    return any(family in NAMES[meaning] for meaning in RIGHT[kind].meanings)

@@ -14,15 +14,18 @@ from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, hande
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _FUNCTIONS = """
+REACH_M = {reach_m!r}  # the memory is how far it has moved, over this, and how fast, over this times its frequency
+
+
 def force(p, seen):
-    return p.stiffness_n_per_m * (seen.travel_m - seen.memory[0])
+    return p.stiffness_n_per_m * (seen.travel_m - REACH_M * seen.memory[0])
 
 
 def rates(p, seen):
-    moved_m, moved_mps = seen.memory
+    moved, speed = seen.memory
+    lost = (2 * p.damping_ratio + p.square_per_m * REACH_M * np.abs(speed)) * speed
     omega = 2 * np.pi * p.frequency_hz
-    lost_mps2 = 2 * p.damping_ratio * omega * moved_mps + p.square_per_m * moved_mps * np.abs(moved_mps)
-    return (moved_mps, omega**2 * (seen.travel_m - moved_m) - lost_mps2)
+    return (omega * speed, omega * (seen.travel_m / REACH_M - moved - lost))
 """
 _RIGID = """
 def structure(self, p, structure):
@@ -31,7 +34,7 @@ def structure(self, p, structure):
 
 
 class InertiaBehindSpring(Family):
-    title = "inertia in the suspensions, perhaps in series with a spring"
+    title = "inertia beside the springs, perhaps in series with one"
     related_effects = ("top_mount_compliance", "hysteresis")
     source = ("M. C. Smith, IEEE Trans. Automatic Control 47 (2002) 1648: the inerter; W. C. Flower, SAE 850975 "
               "(1985): hydraulic mounts")
@@ -57,8 +60,8 @@ class InertiaBehindSpring(Family):
         return [self.draft((inertance,), _RIGID, kind="BodyEffect", variant="rigid",
                            title="inertia that moves with the suspensions' travel",
                            signature="the wheels hop at a lower frequency, and the body feels it"),
-                self.draft(sprung, handed_on(states=2), _FUNCTIONS, title="inertia in series with a spring",
-                           variant="sprung", at="loop")]
+                self.draft(sprung, handed_on(states=2), _FUNCTIONS.format(reach_m=context.reach("travel_m", 0.9)),
+                           title="inertia in series with a spring", variant="sprung", at="loop")]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         if draft.variant == "rigid":

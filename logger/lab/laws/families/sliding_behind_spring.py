@@ -2,8 +2,9 @@
 
 Both carry the force F: the spring is stretched by s = F / k beyond the play, and what slides goes at the rate
 (F / F0)^n, which is Norton's creep. n = 1 is a damper behind rubber (Maxwell), a large n friction that gives before it
-slides, or a fluid that yields; between them are valves that open. F0, which the force comes to where the part is moved
-at one usual rate, may differ between lengthening and shortening. It acts beside the part's own spring and damper.
+slides, or a fluid that yields; between them are valves that open. F0 is what the force comes to where the part is moved
+at one usual rate. It acts beside the part's own spring and damper. (What differs by direction is a curve of the rate
+behind a spring, ``force_by_rate``.)
 """
 
 from __future__ import annotations
@@ -22,10 +23,7 @@ def force(p, seen):  # the memory is the spring's stretch over the yield travel
 def rates(p, seen):
     z, play = seen.memory[0], p.play_m / p.yield_travel_m
     size = z - min(max(z, -play), play)  # the force over that of sliding
-    if size < 0.0:
-        slides_mps = -p.sliding_rate_m_per_s * (-size * p.lengthening_ratio) ** p.power_ratio
-    else:
-        slides_mps = p.sliding_rate_m_per_s * size ** p.power_ratio
+    slides_mps = p.sliding_rate_m_per_s * np.sign(size) * np.abs(size) ** p.power_ratio
     return ((seen.rate_mps - slides_mps) / p.yield_travel_m,)
 """
 
@@ -46,31 +44,26 @@ class SlidingBehindSpring(Family):
         size_n = rounded(0.3 * (front.suspension_stiffness_n_per_m * travel_m
                                 + front.suspension_damping_n_s_per_m * rate_mps))
         lengths_m = tuple(rounded(one * travel_m) for one in (0.02, 0.2))
-        force, over, power, rate, ratio, play = (
+        force, over, power, rate, play = (
             Parameter("sliding_force_n", size_n, 0.0, 1e4 * size_n, 0.0, Scale.LINEAR, (size_n,),
-                      f"as it slides at {rate_mps:g} m/s, shortening"),
+                      f"as it slides at {rate_mps:g} m/s"),
             Parameter("yield_travel_m", lengths_m[0], 1e-4 * lengths_m[0], 10 * travel_m, None, Scale.LOG, lengths_m,
                       "over which the spring reaches that force"),
             Parameter("power_ratio", 1.5, 0.3, 40.0, None, Scale.LOG, (1.5, 6.0),
                       "exponent of the force in the rate of sliding"),
             Parameter("sliding_rate_m_per_s", rate_mps, rate_mps, rate_mps, None, Scale.LOG, (rate_mps,),
                       "at which the sliding part has its force", default=rate_mps),
-            Parameter("lengthening_ratio", 1.0, 0.1, 10.0, None, Scale.LOG, (1.0,),
-                      "of the force of shortening to that of lengthening"),
             Parameter("play_m", 0.1 * travel_m, 0.0, travel_m, None, Scale.LINEAR, (0.1 * travel_m,),
                       "in each direction, within which there is no force"))
-        one_way = replace(ratio, low=1.0, high=1.0, default=1.0)
         tight = replace(play, start=0.0, high=0.0, trials=(0.0,), default=0.0)
-        return [self.draft((force, over, power, rate, *more), handed_on(states=1), _FUNCTIONS, variant=variant,
-                           at="loop", title="a part slides behind a spring")
-                for variant, more in (("alike", (one_way, tight)), ("by direction", (ratio, tight)),
-                                      ("with play", (one_way, play)))]
+        return [self.draft((force, over, power, rate, one), handed_on(states=1), _FUNCTIONS, variant=variant, at="loop",
+                           title="a part slides behind a spring")
+                for variant, one in (("alike", tight), ("with play", play))]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
-        more = {"by direction": f", {say('lengthening_ratio')} times that of lengthening",
-                "with play": f", with play of {say('play_m', 1000.0, 'mm')} either way"}.get(draft.variant, "")
+        play = f", with play of {say('play_m', 1000.0, 'mm')} either way" * (draft.variant == "with play")
         return (f"sliding behind a spring, {say('sliding_force_n')} over {say('yield_travel_m', 1000.0, 'mm')} at the "
-                f"power {say('power_ratio')}{more}")
+                f"power {say('power_ratio')}{play}")
 
 
 FAMILY = SlidingBehindSpring()

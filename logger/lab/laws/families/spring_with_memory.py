@@ -20,7 +20,7 @@ def rates(p, seen):
 
 
 class SpringWithMemory(Family):
-    title = "a spring with memory in the suspensions: rubber that creeps"
+    title = "a spring with memory: rubber that creeps"
     related_effects = ("top_mount_compliance", "hysteresis")
     source = ("J. C. Maxwell, Phil. Trans. R. Soc. 157 (1867) 49; for rubber: M. Berg, Vehicle System Dynamics 30 "
               "(1998) 197")

@@ -1,4 +1,4 @@
-"""A stiffness that changed long ago is another stiffness: beside a car that has it from the beginning."""
+"""What changed long ago is another number of the car: beside one that has it from the beginning."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.lab.laws.families.changing_stiffness import _draft
+from logger.lab.laws.families.changing_with_time import _draft
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import chosen
@@ -19,14 +19,18 @@ LONG_AFTER = slice(600, None)  # ten time constants, and what rings after them
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("of", "number"), [("springs", "suspension_stiffness_n_per_m"),
-                                            ("tires", "tire_stiffness_n_per_m")])
-def test_long_after_it_is_a_car_with_that_stiffness(of: str, number: str) -> None:
+@pytest.mark.parametrize(("what", "more", "number"), [
+    (("springs", "travel_m", "50000.0", "BODY_AND_WHEEL"), 5000.0, "suspension_stiffness_n_per_m"),
+    (("tires", "deflection_m", "50000.0", "WHEEL_AND_GROUND"), 5000.0, "tire_stiffness_n_per_m"),
+    (("dampers", "rate_mps", "laws.damping_n_s_per_m", "BODY_AND_WHEEL"), None, "suspension_damping_n_s_per_m")])
+def test_long_after_it_is_a_car_with_that_number(what: tuple[str, str, str, str], more: float | None, number: str
+                                                 ) -> None:
     def changed(axle: Axle | None) -> Axle | None:
-        return axle and replace(axle, **{number: getattr(axle, number) + 5000.0})
+        was = 0.0 if axle is None else getattr(axle, number)
+        return axle and replace(axle, **{number: was + (0.1 * was if more is None else more)})
 
     runs = SimulatedRuns(secret_runs().runs)
-    law = chosen(_draft(of, 50000.0, 60.0).effect, {"changed_n_per_m": 5000.0, "time_s": 0.6})
+    law = chosen(_draft(*what, 60.0).effect, {"changed_ratio": 0.1, "time_s": 0.6})
     front = changed(CAR.front)
     assert front is not None
     other = replace(CAR, front=front, rear=changed(CAR.rear))
