@@ -355,7 +355,7 @@ def _tiles(figures: FleetFigures, sections: RoadTable) -> doc.Html:
         ("Change of the average road", f"{growth:+.1%}" if np.isfinite(growth) else None, "a year"),
         ("Became worse", f"{int(sections.worse.sum()):,}" if sections.changes_known else None,
          f"of {len(sections.key):,} sections"),
-        ("To visit", f"{int((sections.visit != '').sum()):,}", "sections"),
+        ("Work list", f"{int((sections.visit != '').sum()):,}", "sections"),
     ])
 
 
@@ -393,10 +393,10 @@ def _rough(sections: RoadTable) -> doc.Html:
     heads = ("Place", "IRI [m/km]", "Length [m]", "Cars", "Passes", "Last seen", "Why")
     none = ("No section is rough, worse or uncomfortable." if np.isfinite(sections.iri_std_m_per_km).any() else
             "Too few drives to be certain of any section.")
-    return doc.section("To visit", doc.grid(heads, rows, words=(0, 5, 6)) + doc.hint(
+    return doc.section("Work list", doc.grid(heads, rows, words=(0, 5, 6)) + doc.hint(
         "Sections of 0.1 mi, one direction each. Rough: above 170 in/mi with 95 % certainty; worse: its change is "
         "significant; uncomfortable: 0.8 m/s² and more. Cars and passes: the fewest cars and the mean passes of its "
-        "segments.")) if rows else doc.section("To visit", doc.html('<p class="empty">{}</p>', none))
+        "segments.")) if rows else doc.section("Work list", doc.html('<p class="empty">{}</p>', none))
 
 
 def _worse(sections: RoadTable) -> doc.Html:

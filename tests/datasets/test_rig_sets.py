@@ -97,7 +97,7 @@ def test_the_silverbox_study_names_the_spring_and_simulates_its_tests(
 def test_the_emps_study_names_friction_and_finds_the_axis(axis: Path, capsys: pytest.CaptureFixture[str]) -> None:
     main(["study", "emps", str(axis), "--json"])  # its numbers are not the published ones
     found = json.loads(capsys.readouterr().out)
-    numbers = next(table for table in found["tables"] if table["title"] == "Numbers of the axis")
+    numbers = next(table for table in found["tables"] if table["title"] == "Parameters of the axis")
     for row, truth in zip(numbers["rows"], (AXIS_KG, VISCOUS, COULOMB_N), strict=True):
         assert row[2] == pytest.approx(truth, rel=0.01), row
 

@@ -96,7 +96,7 @@ class Identification(CommandResult):
     cannot_tell    sentences that stand between the numbers and their being believed; empty: none
     """
 
-    title: ClassVar[str] = "Fitted numbers"
+    title: ClassVar[str] = "Fitted parameters"
 
     fit: Fit | RoadFit
     model: Model

@@ -60,7 +60,7 @@ def run(folder: Path, effort: Workload) -> Result:
                   float(found.diagnosis.verdict[:1] == (EFFECT,)), 1, 1, of=("EMPS friction",)),
         Statement("NRMSE of the force", "Coulomb friction", better, 0.0, linear / 2,
                   of=("EMPS friction",)),
-        *(Value(name, printed, value, _NEAR * printed, of=("EMPS numbers",))
+        *(Value(name, printed, value, _NEAR * printed, of=("EMPS parameters",))
           for (name, printed), value in zip(PUBLISHED, ours, strict=True))))
 
 
@@ -86,18 +86,18 @@ def _beside(found: data_sets.Improved, ours: Sequence[float]) -> Table:
               friction.standard_errors.get(FRICTION) if friction else None)
     rows = tuple((name, printed, value, error, 100 * (value / printed - 1))
                  for (name, printed), value, error in zip(PUBLISHED, ours, errors, strict=True))
-    return Table("Numbers of the axis", ("number", "published .5g", "ridelog .5g", "its standard error .2g",
-                                         "apart [%] +.1f"), rows)
+    return Table("Parameters of the axis", ("parameter", "published .5g", "ridelog .5g", "its standard error .2g",
+                                            "difference [%] +.1f"), rows)
 
 
 _DOWNLOAD = "download the EMPS files from nonlinearbenchmark.org and unpack them; DATA_EMPS is read"
 STUDY = Study(
-    "emps", "A linear axis with friction: what its model lacks", "Numbers of the axis",
+    "emps", "A linear axis with friction: what its model lacks", "Parameters of the axis",
     "The training record is written as a user would: a component that its bench moves (the encoder's position) while "
     "its force is measured. The file knows the mass to 20 % and viscous friction to 50 %.",
     data_sets.rig_from_folder("the EMPS record", _DOWNLOAD, run),
     (Item("EMPS friction", Word.AGREES, "diagnose names Coulomb friction, which halves the error of the force."),
-     Item("EMPS numbers", Word.AGREES, "Mass, viscous and Coulomb friction within 1 %.")),
+     Item("EMPS parameters", Word.AGREES, "Mass, viscous and Coulomb friction within 1 %.")),
     source="A. Janot, M. Gautier, M. Brunot, Nonlinear System Identification Benchmarks, 2019",
     data=f"the EMPS record ({_DOWNLOAD})")
 STUDIES = (STUDY,)
