@@ -21,6 +21,8 @@ BY_ROAD, BY_RECEIVER = "road", "receiver"
 """By what the places of a run were found (``RecordFacts.places_by``)."""
 SKIP_S = 2.0
 """How much of the beginning of a run is left out of fits and errors, as the car's past is not known [s]."""
+LEAST_S = 5.0
+"""A shorter run is of no use to the lab: the body bounces some three times after ``SKIP_S`` [s]."""
 EVEN_SAMPLES = 1e-3
 """A time within so many samples of one is at that sample: rates are read off times that were rounded."""
 RECEIVER_ERROR_LASTS_S = 60.0

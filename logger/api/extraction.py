@@ -25,6 +25,8 @@ from drivers.readings import folder_name
 from logger.arrays import Array, Bools
 from logger.bounds import ACCELERATION, LONGEST_HOLE_S, MOVING_MPS, SPEED, samples_between
 from logger.dsp.repeated_samples import find_holds, resolution, still_until_s
+from logger.dsp.resample import GRID_RATE_HZ, PASS_HZ
+from logger.dsp.whole_record import SEEN_OF_RATE
 from logger.errors import BadInput
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.receiver_delay import CarriedDelay, combined
@@ -33,7 +35,6 @@ from logger.extraction.along_track import registered
 from logger.extraction.recorded_columns import (
     GRAVITY_WITHIN,
     NO_GRAVITY_MPS2,
-    SEEN,
     EvenSamples,
     even_samples,
     felt,
@@ -49,7 +50,7 @@ from logger.extraction.recorded_columns import (
 from logger.files import make_folder, remove_file, together
 from logger.left_out import LeftOut, counting
 from logger.printable import counted, word
-from logger.runs import BY_RECEIVER, BY_ROAD, CLIPPED, NO_READING, READING, RecordFacts, Run
+from logger.runs import BY_RECEIVER, BY_ROAD, CLIPPED, LEAST_S, NO_READING, READING, RecordFacts, Run
 from logger.service import wiring
 from logger.service.config import Config
 from logger.service.drive_readings import DriveReadings, GridReadings
@@ -171,9 +172,9 @@ def _fixes_of_dump(kept: Any, later_s: float) -> Fixes:
 
 Tell = Callable[[str], None]
 
-RATE_HZ = 100.0
-LEAST_S, LEAST_M = 5.0, 30.0
-"""A shorter run is of no use to the lab: it leaves out the first two seconds."""
+RATE_HZ = float(GRID_RATE_HZ)
+LEAST_M = 30.0
+"""A run over less road is of no use to the lab (as one of less than ``LEAST_S``)."""
 _LINE_SCALE_STD = 0.001
 """Of lengths along a line (a judgement: odometers of profilers are checked to one or two thousandths; a receiver's
 speeds, by the Doppler shift, have no scale error to speak of)."""
@@ -535,7 +536,6 @@ def _around(profile: Wheelpaths, distance_m: Array) -> Any:
     return replace(track, elevation_m=track.elevation_m[first:last], start_m=track.start_m + first * track.spacing_m)
 
 
-_FLAT_TO_HZ = 38.0  # a run is (docs/at-the-desk.md)
 _CUT_S = 1.0  # to either side of a turn in the mount
 _LATEST_S = 1e5  # of later times the ten digits of a drive do not distinguish samples
 _DISORDER_S = 0.5
@@ -608,9 +608,9 @@ def recorded_csv(source: Path, asked: CsvSettings, config: Config, tell: Tell) -
         receiver = replace(receiver, delay_s=0.0, std_s=0.0)
     fixes = replace(raw, time_s=raw.time_s - receiver.delay_s)
     readings = _levelled(even, asked, has_gravity, notes)
-    seen_hz = SEEN * even.own_hz
+    seen_hz = SEEN_OF_RATE * even.own_hz
     facts = RecordFacts(step_mps2=_step_mps2(samples), taken_hz=None if even.as_read else even.own_hz,
-                        pass_band_hz=(0.0, seen_hz) if seen_hz < _FLAT_TO_HZ else None)
+                        pass_band_hz=(0.0, seen_hz) if seen_hz < PASS_HZ else None)
     return Recorded(readings, fixes, config, model, facts, receiver, tables.acceleration.is_torn, tuple(notes),
                     left_out=_left_out(even, len(time_s), still_s))
 
@@ -834,8 +834,8 @@ def _repairs(even: EvenSamples) -> list[str]:
                       f"{max(even.holds_s):.3g} s; those samples are left out"]
     if not even.as_read:
         notes.append(f"{even.own_hz:.4g} samples a second, resampled to an even {RATE_HZ:g} Hz")
-    if SEEN * even.own_hz < _FLAT_TO_HZ:
-        notes.append(f"shows nothing above {SEEN * even.own_hz:.0f} Hz: the lab may name sensor_bandwidth for that")
+    if (seen_hz := SEEN_OF_RATE * even.own_hz) < PASS_HZ:
+        notes.append(f"shows nothing above {seen_hz:.0f} Hz: the lab may name sensor_bandwidth for that")
     if even.clipped.any():
         notes.append(f"{np.count_nonzero(even.clipped)} samples at an end of the sensor's range, marked in the column "
                      "usable")

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 from logger.api.log_questions import IngestQuestion, ReportQuestion, SummariseQuestion, day_us
 from logger.api.shown import CommandResult
 from logger.errors import BadInput
-from logger.files import note, read_bounded, replace_bytes
+from logger.files import MAP_BYTES, note, read_bounded, replace_bytes
 from logger.fleet.dataset import EXTRA, Dataset, Engine, existing, opened
 from logger.fleet.road_map import RoadMap, RoadPieces, cell_keys, pieces_of
 from logger.question import function
@@ -152,12 +152,12 @@ def _pieces(dataset: Dataset) -> RoadPieces | None:
 @contextmanager
 def _keys(dataset: Dataset, roads: Path | None) -> Iterator[tuple[Keyed, str]]:
     """How keys are made, and the SHA-256 of the map."""
-    from logger.store.formats.road_lines import MAX_BYTES, read_road_lines
+    from logger.store.formats.road_lines import read_road_lines
 
     if roads is None and not dataset.manifest.roads:
         yield lambda lat_deg, lon_deg, heading_deg, drive: cell_keys(lat_deg, lon_deg, heading_deg), ""
         return
-    content = read_bounded(roads or dataset.folder / _ROADS, MAX_BYTES)
+    content = read_bounded(roads or dataset.folder / _ROADS, MAP_BYTES)
     digest = sha256(content).hexdigest()
     if not dataset.is_new and digest != dataset.manifest.roads:
         raise BadInput(f"{roads or dataset.folder / _ROADS}: expected the roads of the first ingest")

@@ -30,7 +30,7 @@ from logger.modal.driven_car import car_modes
 from logger.modal.mode import FoundMode, ModalResult, pole_rows
 from logger.printable import counted
 from logger.question import COMMON_IRI, COMMON_SPEED_MPS, IRI, SPEED, function
-from logger.report.blocks import Block, Blocks, Lines, Section, Table
+from logger.report.blocks import SHOWN_ROWS, Block, Blocks, Lines, Section, Table
 from logger.report.quantities import known
 from logger.runs import READING, SKIP_S
 from logger.store.formats import record_checks
@@ -344,7 +344,6 @@ def name_of(given: record_checks.ChannelRecord | Path | str) -> str:
     return "record" if isinstance(given, record_checks.ChannelRecord) else str(given)
 
 
-_REJECTED_SHOWN = 12
 _IN_STEP = 0.02  # a shape whose parts are nearer to in step than this is shown with signs alone
 
 
@@ -394,7 +393,7 @@ def blocks(result: ModalResult, record: ChannelRecord, name: str) -> Iterator[Bl
     else:
         yield "No mode: nothing in this record exceeds noise."
     yield Section("Rejected", [Table(("Hz", ""), [
-        (f"{one.frequency_hz:.4g}", one.reason) for one in result.rejected], (1,), _REJECTED_SHOWN)])
+        (f"{one.frequency_hz:.4g}", one.reason) for one in result.rejected], (1,), SHOWN_ROWS)])
 
 
 def with_error(value: float, std: float) -> str:

@@ -244,7 +244,8 @@ def chains(found: CombinedDrives) -> list[np.ndarray]:
 
 SIGNIFICANT = 0.05
 """Share of false finds among the cells that are said to have changed."""
-MOST_VISITS, MOST_CHANGES = 20, 20
+MOST_PLACES = 20
+"""Rows of a table of places at a terminal, which is looked through, not read."""
 
 
 def blocks(found: CombinedDrives, marked: Sequence[int] = ()) -> Iterator[Block]:
@@ -263,7 +264,7 @@ def blocks(found: CombinedDrives, marked: Sequence[int] = ()) -> Iterator[Block]
     yield Section("Work list", [
         Table(_VISIT_HEADS, [
             (_number(number, marked), one.kind, _place(found, one.worst), *_visit_cells(found, one))
-            for number, one in enumerate(found.visits, start=1)], (0, 1, 2, 3, 7), MOST_VISITS,
+            for number, one in enumerate(found.visits, start=1)], (0, 1, 2, 3, 7), MOST_PLACES,
             ": --visit FILE writes all of them"), Hint(f"Rough: above {found.above_m_per_km:.2f} m/km."),
         hint("A place has its number in all tables, on the map and in the curves.")])
 
@@ -348,7 +349,7 @@ def largest_changes(change: Changes) -> list[int]:
     """The largest of those that are sure, worse or better."""
     sure = np.flatnonzero(change.false_share <= SIGNIFICANT)
     order = sure[np.argsort(-np.abs(change.change_m_per_km[sure]), kind="stable")]
-    return list(map(int, order[:MOST_CHANGES]))
+    return list(map(int, order[:MOST_PLACES]))
 
 
 def compass(heading_deg: float) -> str:
@@ -447,7 +448,7 @@ def passes_page(found: CombinedDrives) -> Html:
     """The page. Ways follow each other as if they had been driven in one go, with a gap between."""
     title = f"Road roughness, mean of {counted(found.drives, 'drive')}", _days(found)
     order = [cell for chain in chains(found) for cell in chain.tolist()]
-    rows = [order.index(one.worst) for one in found.visits[:MOST_VISITS]]
+    rows = [order.index(one.worst) for one in found.visits[:MOST_PLACES]]
     return page([LoggedFile("means of drives", tuple(_rows(found)), 0, {})], title=title, marked=rows or None, first=(
         section("Repeated drives combined", elements(blocks(found, rows))),))
 

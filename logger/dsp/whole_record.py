@@ -37,6 +37,8 @@ from logger.dsp.filters import STOP_DB, kaiser_half_length, kaiser_window, low_p
 
 _REACH = 12  # grid steps on either side
 _KERNEL_STOP_DB = 70.0
+SEEN_OF_RATE = 0.45
+"""Share of its rate below which a record shows what there is: above it, its recorder lets hardly anything through."""
 _RIDGE = 1e-2
 _CHUNK, _MARGIN = 4096, 48
 _BAND_REACH = 24  # steps of the lower rate

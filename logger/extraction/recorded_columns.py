@@ -79,7 +79,6 @@ def _gaps(time_s: Array, longest_s: float) -> list[tuple[float, float]]:
 
 LEAST_RATE_HZ = 40.0
 """Wheels hop at 10 to 15 Hz; a record shows what lies below 0.45 of its rate (``dsp.whole_record``)."""
-SEEN = 0.45
 _FEWEST = 20  # samples of a piece: the filter's ends are continued by guesses
 _FEW_STEPS = 3.5
 _INSTANT_S = 1e-6

@@ -315,7 +315,6 @@ def _hundredths(values: Array) -> list[int | None]:
     return [round(value * 100) if value == value else None for value in values.tolist()]
 
 
-_SHOWN = 20
 _SHARED = ("windows.js", "canvas.js", "map.js")
 _STYLE = """
 .tiles dd{white-space:normal}
@@ -386,7 +385,7 @@ def _place(sections: RoadTable, one: int) -> doc.Html:
 
 def _rough(sections: RoadTable) -> doc.Html:
     order = np.flatnonzero(sections.visit != "")
-    order = order[np.argsort(-sections.iri_m_per_km[order], kind="stable")][:_SHOWN].tolist()
+    order = order[np.argsort(-sections.iri_m_per_km[order], kind="stable")][:_SHOWN_ROADS].tolist()
     rows = [(_place(sections, one), f"{sections.iri_m_per_km[one]:.2f} {error_words(sections.iri_std_m_per_km[one])}",
              f"{sections.length_m[one]:.0f}", str(sections.cars[one]), f"{sections.passes[one]:.0f}",
              f"{utc(int(sections.last_us[one])):%Y-%m-%d}", sections.visit[one].replace("|", ", ")) for one in order]
@@ -401,7 +400,7 @@ def _rough(sections: RoadTable) -> doc.Html:
 
 def _worse(sections: RoadTable) -> doc.Html:
     order = np.flatnonzero(sections.worse)
-    order = order[np.argsort(sections.p_value[order], kind="stable")][:_SHOWN].tolist()
+    order = order[np.argsort(sections.p_value[order], kind="stable")][:_SHOWN_ROADS].tolist()
     rows = [(_place(sections, one), f"{sections.iri_m_per_km[one]:.2f}",
              f"{sections.trend_m_per_km_per_year[one]:+.2f} ± {sections.trend_std_m_per_km_per_year[one]:.2f}",
              f"{sections.p_value[one]:.1g}") for one in order]
@@ -412,7 +411,7 @@ def _worse(sections: RoadTable) -> doc.Html:
 
 def _cars(figures: FleetFigures) -> doc.Html:
     biases = figures.biases
-    order = np.argsort(-np.abs(biases.gain - 1.0) * biases.known, kind="stable")[:_SHOWN].tolist()
+    order = np.argsort(-np.abs(biases.gain - 1.0) * biases.known, kind="stable")[:_SHOWN_ROADS].tolist()
     rows = [(figures.names[one], f"{biases.gain[one] - 1.0:+.1%} ± "
              f"{biases.gain[one] * biases.log_std[one]:.1%}" if biases.known[one] else "not known",
              f"{figures.car_passes[one]:,.0f}") for one in order]

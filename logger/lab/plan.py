@@ -44,6 +44,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.arrays import Array
+from logger.dsp.resample import GRID_RATE_HZ
 from logger.lab.diagnosis import obstacles_of
 from logger.lab.likelihood.distance_error import USUAL, ErrorSize
 from logger.lab.likelihood.linear_model import LinearModel
@@ -57,7 +58,7 @@ from logger.lab.selection.detectability import DETECTABLE_SIGMA, is_uninformativ
 from logger.lab.selection.evidence import INDISTINGUISHABLE
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
-from logger.runs import RecordFacts, Run, Signal
+from logger.runs import LEAST_S, RecordFacts, Run, Signal
 from logger.simulation.virtual_drive import (
     SEARCH_HZ,
     Obstacle,
@@ -71,7 +72,7 @@ from logger.vehicle.effect import Chosen, Effect, chosen
 from logger.vehicle.models import structure_of
 from logger.vehicle.vehicle import Vehicle
 
-RATE_HZ = 100.0
+RATE_HZ = float(GRID_RATE_HZ)
 SIGNAL_NOISE = {"travel": 0.0005, "pitch_rate": 0.001, "roll_rate": 0.001}
 """R.m.s. noise of a second sensor that is no accelerometer: a string or rotary potentiometer of 0.25 m with a linearity
 of 0.2 %; a MEMS gyroscope's 0.05 deg/s (InvenSense, MPU-6000 product specification, 6.1) [m, rad/s]."""
@@ -240,7 +241,6 @@ def with_larger_errors(size: ErrorSize, factors: tuple[float, float, float]) -> 
 
 MOST_S = 30.0
 """How long such a drive is at most."""
-_LEAST_S = 5.0
 _SPEEDS_MPS = (5.0, 8.0, 12.0, 18.0, 27.0)  # 18 to 97 km/h, each half as fast again
 _OVER_OBSTACLES_MPS = (4.0, 8.0)
 _BUMP = {"height_m": 0.08, "width_m": 3.6}
@@ -316,7 +316,7 @@ def _with_signals(drive: PlannedDrive, speed: float | None, signals: Sequence[Si
 def _possible(there: PlannedCar, noise: SensorNoise, road: Track, speed_mps: float,
               signals: Sequence[Signal]) -> PlannedDrive | None:
     """The drive, if the road is long enough and the body stays below one g; else None."""
-    if (road.end_m - road.start_m) / speed_mps < _LEAST_S:
+    if (road.end_m - road.start_m) / speed_mps < LEAST_S:
         return None
     drive = PlannedDrive(at_speed("next", road, there.nominal, speed_mps, signals, MOST_S), there, noise)
     return drive if np.abs(drive.run.measured_mps2).max() < STANDARD_GRAVITY_MPS2 else None

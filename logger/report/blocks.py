@@ -52,6 +52,10 @@ class Linked(str):
         return one
 
 
+SHOWN_ROWS = 8
+"""Rows of a long table at a terminal; a page and ``--json`` have all."""
+
+
 @dataclass(frozen=True)
 class Table:
     """Rows under heads; without rows nothing, and columns that are empty in all rows are left out. Those of the numbers

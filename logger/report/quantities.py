@@ -147,6 +147,16 @@ def enumerated(names: Sequence[str], last: str) -> str:
     return f" {last} ".join(filter(None, (", ".join(names[:-1]), names[-1])))
 
 
+FEW = 4
+"""Most of many that a sentence names: more are not read."""
+
+
+def some(words: Sequence[str], between: str = ", ", more: str = "more") -> str:
+    """The first few of many in a row, and how many are left out: "a, b, c, d and 3 more"."""
+    left = len(words) - FEW
+    return between.join(words[:FEW]) + f" and {left} {more}" * (left > 0)
+
+
 def area_values(one: Area) -> dict[str, float | None]:
     """By the names of their columns; None where nothing is known."""
     return {"distance_start_m": one.start_m, "distance_end_m": one.end_m, "worst_m_per_km": one.worst_m_per_km,

@@ -239,7 +239,6 @@ AFTER_S = 1.0
 """How long a drive at one speed goes on after the last wheel has left the profile."""
 OBSTACLE_SPACING_M = 0.01
 _MOST_STEPS = 5_000_000  # what a simulation may hold in memory at once
-_MOST_SAMPLES = 5_000_000
 _LARGEST_M = 10_000.0  # of an obstacle
 _NEARLY = 1e-6  # of a step: what rounding may do
 _FEWEST_STEPS = 2  # of the road, that an obstacle spans
@@ -288,8 +287,8 @@ def with_obstacles(track: Track, obstacles: Sequence[Obstacle]) -> Track:
         return track
     parts = int(np.ceil(track.spacing_m / OBSTACLE_SPACING_M - 1e-9))
     count = (len(track.elevation_m) - 1) * parts + 1
-    if count > _MOST_SAMPLES:
-        longest_km = _MOST_SAMPLES * OBSTACLE_SPACING_M / 1000
+    if count > _MOST_STEPS:
+        longest_km = _MOST_STEPS * OBSTACLE_SPACING_M / 1000
         raise ValueError(f"{obstacles[0].asked}: expected a road of at most {longest_km:g} km")
     number = np.arange(count) / parts
     columns = track.elevation_m.reshape(len(track.elevation_m), -1).T

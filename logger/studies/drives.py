@@ -23,6 +23,7 @@ import numpy as np
 
 from logger.arrays import Array
 from logger.comfort.iso2631 import COMFORT_WORDS, comfort_word
+from logger.dsp.resample import GRID_RATE_HZ
 from logger.dsp.weightings.wk import WEIGHTING
 from logger.dsp.whole_record import in_band
 from logger.estimation.batch import estimated, exact_iri
@@ -50,7 +51,7 @@ from logger.vehicle.vehicle import Vehicle
 
 Shape = Callable[[Array], Array]
 
-RATE_HZ = 100
+RATE_HZ = GRID_RATE_HZ
 BUMP_MPS, BRIDGE_MPS = 16.1 / 3.6, 48.3 / 3.6
 BUMP_HEIGHT_M, BUMP_WIDTH_M, STEP_M = 0.150, 2.60, 0.0381
 SPACING_M = 0.02

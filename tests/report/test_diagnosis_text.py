@@ -203,13 +203,14 @@ def test_what_was_added_and_dropped_again_is_named() -> None:
 
 def test_what_the_runs_cannot_tell_of_comes_with_the_drive_that_would() -> None:
     hidden = tuple(Undetectable(EFFECTS[name], 0.5 * place) for place, name in enumerate(
-        ["wheel_lift", "bump_stop", "payload", "occupant", "sensor_gain", "roll", "cg_shift", "tire_damping"]))
+        ["wheel_lift", "bump_stop", "payload", "occupant", "sensor_gain", "roll", "body_bending", "time_offset",
+         "cg_shift", "tire_damping"]))
     found = replace(NOTHING, undetectable=hidden, obstacles={
         "roll": "one track is known", "dry_friction": ALREADY_PRESENT})
     obstacle, first, *more = untested(found)
     assert obstacle == "roll: not tried; one track is known."
     assert first == f"wheel_lift: detectability 0.0 (6 needed). To see it: {EFFECTS['wheel_lift'].shown_by}."
-    assert len(more) == 7 and more[-2] == "Detectability too low as well: cg_shift, tire_damping."
+    assert len(more) == 9 and more[-2] == "Detectability too low as well: cg_shift, tire_damping."
     assert more[-1].startswith("Detectability: standard deviations by which")
 
 

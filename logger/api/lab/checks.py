@@ -42,9 +42,11 @@ from logger.lab.selection.holdout import ROUNDING
 from logger.left_out import LeftOut
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
+from logger.report.quantities import some
 from logger.roads.iri import likely_unit
 from logger.runs import (
     CLIPPED,
+    LEAST_S,
     NO_READING,
     READING,
     SKIP_S,
@@ -86,8 +88,6 @@ _KINDS = {"displacement": "length", "travel": "length"}
 _APART = 2.0  # kgf and lbf are
 _NO_EFFECT = 20.0  # by so many times no effect and no resonance change all of a signal (a judgement)
 ANYWAY = "--anyway goes on"
-_NAMED = 4
-"""Of the numbers of another car, so many are said."""
 
 
 def check_model(word: str, model: CarModel, runs: SimulatedRuns, warn: Callable[[str], None],
@@ -299,11 +299,10 @@ def _another_car(word: str, model: CarModel, runs: SimulatedRuns, predictions: S
     # An effect in the model's car may explain as much as another car does, and both may have come down to the noise.
     if found is not None and error_with_best_effect(found.runs, model.vehicle, model.effects, known, numbers) > (
             1 + ROUNDING) * found.found_error:
-        far = list(found.shares.items())[:_NAMED]
-        more = f" and {len(found.shares) - _NAMED} more parameters far off" if len(found.shares) > _NAMED else ""
+        far = some([f"{name} {share:+.0%}" for name, share in found.shares.items()], more="more parameters far off")
         yield (f"{runs.runs[0].name}: expected a drive of the car in {word}, found one of another car: the file's "
                f"model explains next to nothing of it (NRMSE {found.error:.2f}), a model with "
-               f"{', '.join(f'{name} {share:+.0%}' for name, share in far)}{more} leaves {found.found_error:.2f}. "
+               f"{far} leaves {found.found_error:.2f}. "
                "Is this the right vehicle file? ridelog identify fits a model's parameters"
                + ("" if COMPILED else "; force effects were not tried, as they need the lab extra"))
 
@@ -330,7 +329,6 @@ def _advice(run: Run, car: Car, band_hz: tuple[float, float]) -> str:
 _SAME_RATE = 1e-3  # times that are written to a millisecond leave the rate of a few seconds so uncertain
 # What the lab looks at of a car lies below 40 Hz: a record of nearly twice this rate or more is thinned to about it.
 _RATE_HZ, _NEARLY = 100.0, 0.25
-LEAST_S = 5.0
 _LEAST_OF_PART_S = 1.0  # a damper's bench makes five turns a second
 _CLIPPED_SHARE = 0.005  # of a record: fewer are a blow or two (a judgement)
 _DIES_DOWN = 0.95  # of the r.m.s.: a damping ratio of 0.3 % does so within six periods (a judgement)

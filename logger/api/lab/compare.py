@@ -33,9 +33,9 @@ from logger.left_out import left_out_json, left_out_lines
 from logger.printable import counted
 from logger.question import function
 from logger.report import document as doc
-from logger.report.blocks import Block, Blocks, Bullets, Detail, Hint, Linked, Section, Table, page
+from logger.report.blocks import SHOWN_ROWS, Block, Blocks, Bullets, Detail, Hint, Linked, Section, Table, page
 from logger.report.charts import chart
-from logger.report.quantities import chance, finite, known, numbers_of, signal_errors, unit_of
+from logger.report.quantities import chance, finite, known, numbers_of, signal_errors, some, unit_of
 from logger.runs import Run, are_on_rig, normalised_rms_error, runs_left_out, short_names
 from logger.store.formats import vehicle_file
 from logger.vehicle.effect import Chosen, Effect
@@ -191,7 +191,6 @@ def addition_of(found: AddedEffects, model: Model) -> AddedEffect:
 
 
 _HELPS = 0.97
-_MOST_MOVES = 3
 
 
 def headline(found: LabComparison) -> list[str]:
@@ -218,7 +217,7 @@ def headline(found: LabComparison) -> list[str]:
         lines.append(f"{' and '.join(found.repeats.names)} are repeats and differ by {apart:.2g} {unit} r.m.s. from "
                      f"their mean: no model can reach an NRMSE below {apart / measured:.2g} on them.")
     if found.far:
-        named = ", ".join(f"{name} by {found.moves[name]:+.0%}" for name in found.far[:_MOST_MOVES])
+        named = some([f"{name} by {found.moves[name]:+.0%}" for name in found.far])
         lines.append(f"The refit moved parameters beyond their tolerance: {named}. Measure them: either the vehicle's "
                      "file is wrong there, or an effect that the model lacks biases them.")
     return lines
@@ -322,8 +321,6 @@ def _part_json(part: Part, unit: str) -> dict[str, Any]:
 
 _BODY_HZ = 5.0
 _QUIET_DB = -80.0
-_MOST_RUNS = 8
-_PLACES, _WORST = 5, 8
 
 
 def judged(found: LabComparison) -> list[Block]:
@@ -376,7 +373,7 @@ def _axis(run: Run) -> str:
 def _whole_drives(residuals: ModelResiduals) -> Detail:
     """What was measured and what the model leaves of it, over the whole of each run."""
     names, drawn = short_names(residuals.runs), []
-    for index, run in enumerate(residuals.runs[:_MOST_RUNS]):
+    for index, run in enumerate(residuals.runs[:SHOWN_ROWS]):
         time_s = (run.first + np.arange(len(residuals.residual[index]))) / residuals.rate_hz
         lines = tuple(line(word, time_s, values[index]) for word, values in (
             ("measured", residuals.measured), ("residual", residuals.residual)))
@@ -414,17 +411,17 @@ def spectra(residuals: ModelResiduals) -> tuple[Curves, Curves]:
 
 def _places(standing: Standing) -> Section:
     lines, names, unit = [], short_names(standing.residuals.runs), standing.residuals.unit
-    for run in standing.residuals.runs[:_MOST_RUNS]:
+    for run in standing.residuals.runs[:SHOWN_ROWS]:
         parts = [part for part in standing.where.place if part.name == run.name]
         if len(parts) > 1:
             lines.append(Line(names[run.name], np.array([(part.low + part.high) / 2 for part in parts]),
                               np.array([part.residual_mps2 for part in parts])))
     along = Curves("Residual along the road", "distance [m]", f"residual, r.m.s. [{unit}]", tuple(lines))
-    worst = standing.where.worst_places(_WORST) if standing.where.place else []
+    worst = standing.where.worst_places(SHOWN_ROWS) if standing.where.place else []
     rows = [(names[part.name], f"{part.low:g} to {part.high:g}", f"{part.share:.1%}", f"{part.residual_mps2:.3g}",
              lab_words.error_text(part, 3)) for part in worst]
     return Section("By place", [*([along] if lines else []), Table(
-        ("Run", "From, to [m]", "Share of the residual", f"Residual [{unit}]", "NRMSE"), rows, most=_PLACES)])
+        ("Run", "From, to [m]", "Share of the residual", f"Residual [{unit}]", "NRMSE"), rows)])
 
 
 def forces_section(forces: ForceMap) -> Detail:
@@ -444,7 +441,7 @@ def _alignment(found: LabComparison) -> Detail:
     windows, runs = found.tests.alignment, found.plain.residuals.runs
     names = short_names(runs)
     lines = [Line(names[run.name], windows.along_m[of], windows.lag_s[of] * 1000, dots=True)
-             for index, run in enumerate(runs[:_MOST_RUNS]) if (of := windows.run == index).any()]
+             for index, run in enumerate(runs[:SHOWN_ROWS]) if (of := windows.run == index).any()]
     drawn = Curves("Lead of the model over the measurement", "distance into the run [m]", "lead [ms]", tuple(lines),
                    (0.0, "no lead"))
     return Detail("Alignment", [*([drawn] if lines and not are_on_rig(runs) else []), Hint(
@@ -529,9 +526,6 @@ def worst_moment(standing: Standing) -> Moment:
     return Moment(index, slice(max(0, middle - reach), middle + reach), f"{names[run.name]}, around {where}")
 
 
-_NAMED = 4
-
-
 def errors(found: AddedEffects) -> Table:
     """The error before, after and of the noise: which of them, the error, its fit, and what it is of."""
     return Table(("", "NRMSE", "Fit", ""), [(which, f"{error:.4f}", f"{fit_percent(error):.1f} %", what)
@@ -578,12 +572,11 @@ def bias(names: Sequence[str], moved: Sequence[Number]) -> str:
     biased = [one for one in moved if one.biased]
     if not biased:
         return f"{together} moved no parameter of the model by more than {BIAS_SIGMA:g} standard errors."
-    listed = ", ".join(one.name for one in biased[:_NAMED])
-    more = f" and {len(biased) - _NAMED} more" if len(biased) > _NAMED else ""
+    listed = some([one.name for one in biased])
     worst = biased[0]
     too_much = (f"{_change(worst.name, worst.found, worst.without)[1:]} too "
                 f"{'high' if worst.without > worst.found else 'low'}")
-    return (f"Without {together} the refit biased {listed}{more}. {worst.name} came out {too_much}, "
+    return (f"Without {together} the refit biased {listed}. {worst.name} came out {too_much}, "
             f"{abs(worst.shift):.1f} standard errors from its value with {'it' if len(names) == 1 else 'them'}.")
 
 

@@ -39,15 +39,24 @@ from logger.printable import percent
 from logger.profiles.track import Track
 from logger.question import function
 from logger.report import document as doc
-from logger.report.blocks import Block, Blocks, Bullets, Detail, Hint, Section, Table, page
+from logger.report.blocks import SHOWN_ROWS, Block, Blocks, Bullets, Detail, Hint, Section, Table, page
 from logger.report.charts import chart
-from logger.report.quantities import chance, enumerated, finite, measured, numbers_of, signal_errors, unit_of, wrapped
+from logger.report.quantities import (
+    chance,
+    enumerated,
+    finite,
+    measured,
+    numbers_of,
+    signal_errors,
+    some,
+    unit_of,
+    wrapped,
+)
 from logger.runs import BY_RECEIVER, UNKNOWN, runs_left_out
 from logger.runs import Run as Record
 from logger.store.formats import drive_file
 from logger.vehicle.effect import Chosen
 
-_SHOWN = 8
 _PLACES_EVERY_M = 10.0
 _LEAST_SHARED_M = 50.0
 """Some seconds of a drive: less road says nothing (``lab.unknown_road.same_road``)."""
@@ -116,7 +125,7 @@ def diagnose(question: DiagnoseQuestion) -> Diagnosis:
     bench = bench_with(question, None if question.candidates is not None else "ridelog diagnose")
     bench = with_candidates(bench, question.candidates)
     found = bench.diagnosed(question.progress)
-    return diagnosis_of(found, bench, None if question.list_all else _SHOWN, _next(question, bench, found))
+    return diagnosis_of(found, bench, None if question.list_all else SHOWN_ROWS, _next(question, bench, found))
 
 
 def diagnosis_of(found: LabDiagnosis, bench: Bench, most: int | None = None, next_command: str = ""
@@ -172,7 +181,7 @@ def _diagnosed_same_road(question: DiagnoseQuestion) -> Diagnosis:
         raise question.wrong("same_road", ": expected two runs or more, each once")
     model = model_of(question.vehicle)
     found = _diagnosed(model, records_of([_drive(one) for one in each(question.runs)]), question)
-    most = None if question.list_all else _SHOWN
+    most = None if question.list_all else SHOWN_ROWS
     return _shown(found, Blocks(same_road_blocks(found, names, most)), same_road_json(found),
                   model.vehicle.name)
 
@@ -266,7 +275,6 @@ def _diagnosed(model: Model, records: Sequence[Record], question: DiagnoseQuesti
         raise BadInput(f"{word}: {error}") from None
 
 
-_MOST_HIDDEN, _MOST_MOVED = 6, 3
 P_VALUE = "p-value (probability that noise alone looks like any known effect):"
 _SUSPECT = 0.1
 """An effect that noise looks like in fewer searches than this is worth a drive: a judgement."""
@@ -344,8 +352,8 @@ def untested(found: LabDiagnosis) -> list[str]:
     lines = lab_words.not_tried(found.not_tried)
     lines += [f"{one.effect.name}: detectability {one.deviations:.1f} ({DETECTABLE_SIGMA:g} needed){_alike(one)}. "
               f"To see it: {one.effect.shown_by}."
-              for one in found.undetectable[:_MOST_HIDDEN]]
-    if rest := [one.effect.name for one in found.undetectable[_MOST_HIDDEN:]]:
+              for one in found.undetectable[:SHOWN_ROWS]]
+    if rest := [one.effect.name for one in found.undetectable[SHOWN_ROWS:]]:
         lines.append(f"Detectability too low as well: {', '.join(rest)}.")
     if found.undetectable:
         lines.append("Detectability: standard deviations by which an effect of usual strength would stand out.")
@@ -377,13 +385,10 @@ def _car(found: LabDiagnosis) -> list[str]:
 
 def _moved(found: LabDiagnosis) -> str:
     """What the runs say of the car's numbers, the farthest first."""
-    shown = [f"{name} by {share:+.1%} ± {error:.1%}"
-             for name, (share, error) in [*found.moved.items()][:_MOST_MOVED]]
-    rest = len(found.moved) - len(shown)
-    more = f", and {rest} more" * bool(rest)
+    shown = some([f"{name} by {share:+.1%} ± {error:.1%}" for name, (share, error) in found.moved.items()])
     relative = "" if found.shows_forces else (
         " (Masses, springs and dampers are known only relative to each other: no run shows their common scale.)")
-    return (f"The refit moved parameters of the vehicle's file: {', '.join(shown)}{more}.{relative} Measure one of "
+    return (f"The refit moved parameters of the vehicle's file: {shown}.{relative} Measure one of "
             "them and enter it in the file: an effect with the same influence would then show.")
 
 

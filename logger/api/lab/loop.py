@@ -32,7 +32,7 @@ from logger.lab.selection.add_effect import AddedEffects, Number, moved_between
 from logger.lab.selection.holdout import JUDGED_ON
 from logger.question import Notify, function
 from logger.report import document as doc
-from logger.report.blocks import Block, Blocks, Bullets, Hint, Section, Table, page, text
+from logger.report.blocks import SHOWN_ROWS, Block, Blocks, Bullets, Hint, Section, Table, page, text
 from logger.report.charts import chart
 from logger.report.quantities import wrapped
 from logger.store.formats import vehicle_file as vehicle_format
@@ -40,7 +40,6 @@ from logger.vehicle.effect import Chosen
 
 STORY, LAW = "story.html", "law.py"
 MOST_ROUNDS = 6
-_SHOWN = 5
 
 Say = Callable[[Iterable[str]], None]
 Ask = Callable[[Bench, str], str | None]
@@ -227,7 +226,7 @@ def go_through(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progres
         going = False
         notify(chapter("Diagnose", explain("diagnose", "", word)))
         diagnoses.append(_diagnosed(step.given, frozenset(refused), progress))
-        notify([text(diagnosing.diagnosis_blocks(diagnoses[-1], _SHOWN))])
+        notify([text(diagnosing.diagnosis_blocks(diagnoses[-1], SHOWN_ROWS))])
         if diagnoses[-1].exceeds_noise and asked:
             asked = False
             if learns():

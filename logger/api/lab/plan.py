@@ -14,7 +14,6 @@ from typing import Any
 import numpy as np
 
 from logger.api.lab.bench import Bench, among, bench_with, planned_bench, tolerance_of, word_of
-from logger.api.lab.checks import LEAST_S
 from logger.api.lab.question import PlanQuestion
 from logger.api.lab.words import not_tried
 from logger.api.roads import read_profile
@@ -39,7 +38,8 @@ from logger.profiles.track import Track
 from logger.question import function
 from logger.report import document as doc
 from logger.report.blocks import Block, Blocks, Bullets, Detail, Hint, Section, Table, page
-from logger.runs import Past, Run
+from logger.report.quantities import some
+from logger.runs import LEAST_S, Past, Run
 from logger.store.formats import drive_file, profile_file, vehicle_file
 
 
@@ -142,7 +142,7 @@ def _longest_road(bench: Bench | None) -> Track | None:
     return max(roads, key=lambda one: float(np.subtract(one.end_m, one.start_m)), default=None)
 
 
-_MOST_NEXT, _MOST_GAINS = 5, 4
+_MOST_NEXT = 5
 SENSOR_HINT = ("Assumed noise: a second accelerometer like the first, a travel sensor 0.5 mm, a gyroscope "
                "0.001 rad/s.")
 _OBSTACLES = {"bump": "a speed bump {height_m:g} m high and {width_m:g} m long",
@@ -238,12 +238,9 @@ def next_words(one: LabNextDrive) -> str:
     """What is to be done, and what it brings."""
     if not one.gains:
         return f"{do_words(one.option)}: adds next to nothing."
-    shown = dict(list(one.gains.items())[:_MOST_GAINS])
-    more = len(one.gains) - len(shown)
-    gains = ", ".join(f"{name} {number(each)}" for name, each in shown.items())
+    gains = some([f"{name} {number(each)}" for name, each in one.gains.items()])
     count = f"{one.more_named:.1f} more effects named" if one.more_named >= 0.05 else "no more effects named"
-    return (f"{do_words(one.option)}: {count} (expected). Standard deviations gained: {gains}"
-            f"{f' and {more} more' if more else ''}.")
+    return (f"{do_words(one.option)}: {count} (expected). Standard deviations gained: {gains}.")
 
 
 def as_json(found: LabPlan) -> dict[str, Any]:

@@ -16,8 +16,8 @@ from logger.lab.residuals.breakdown import Part
 from logger.lab.residuals.unexplained import EXPONENTIAL, OFFSET, RAMP, STEP, WANDER, Drift, Removed, Shape, SpatialLine
 from logger.lab.selection.holdout import AS_FILED, JUDGED_ON, REFITTED, ErrorStep, fit_percent, rising
 from logger.printable import percent
-from logger.report.blocks import Block, Detail, Hint, Table
-from logger.report.quantities import enumerated
+from logger.report.blocks import SHOWN_ROWS, Block, Detail, Hint, Table
+from logger.report.quantities import enumerated, some
 from logger.runs import shortened
 
 _WHEEL_RADII_M = (0.22, 0.5)
@@ -62,7 +62,6 @@ def paired(before: Sequence[Part], after: Sequence[Part]) -> list[tuple[Part | N
 
 _ALIKE = 0.15
 """Drifts whose numbers differ by less are said at once."""
-_MOST = 4
 _REMOVED_WORDS = {
     OFFSET: "a constant offset of {size:.2g} m/s2",
     RAMP: "a ramp of {size:.2g} m/s2 in total",
@@ -99,9 +98,7 @@ def drift_words(found: Removed) -> str:
         times = [one.time_s for one in drifts if one.time_s is not None]
         return _REMOVED_WORDS[first.form].format(size=size, time=float(np.median(times)) if times else np.nan)
     names = shortened([one.run for one in found.drifts])
-    each = [f"{names[one.run]}: {_said(one)}" for one in drifts[:_MOST]]
-    more = len(drifts) - len(each)
-    return "; ".join([*each, f"and {more} more runs"] if more else each)
+    return some([f"{names[one.run]}: {_said(one)}" for one in drifts], "; ", "more runs")
 
 
 def removed_json(found: Removed) -> dict[str, Any]:
@@ -143,7 +140,7 @@ def _picture(found: Removed) -> list[Curves]:
         return []
     names = shortened([one.run for one in found.drifts])
     lines = tuple(Line(names[one.run], np.arange(len(one.curve_mps2)) / one.rate_hz, one.curve_mps2)
-                  for one in found.drifting_sensors[:2 * _MOST])
+                  for one in found.drifting_sensors[:SHOWN_ROWS])
     return [Curves("Sensor drift", "time [s]", "acceleration [m/s2]", lines)]
 
 

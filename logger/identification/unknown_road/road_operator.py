@@ -21,13 +21,12 @@ import numpy.typing as npt
 from scipy.fft import irfft, rfft
 
 from logger.arrays import Array, Complex
+from logger.dsp.whole_record import SEEN_OF_RATE
 from logger.estimation.road_solver import patch_gain
 from logger.runs import SLOWEST_MPS
 from logger.vehicle.simulate import smooth_length
 
 _SWELL_S, _APPROACH_S, _TAIL_S, _REST_S = 2.0, 3.0, 1.0, 2.0
-# Above this share of the rate the recorder lets nothing through, and waves of the road are left out.
-_HIGHEST_OF_RATE = 0.45
 _FAST_SHARE = 0.99
 _SPEED_STEPS_PER_E = 20
 _MARGIN_M = 5.0
@@ -91,7 +90,7 @@ class Crossing:
         self._window = _window(len(way), int(_SWELL_S * drive.rate_hz), int(_TAIL_S * drive.rate_hz))
         self.speed_mps = np.maximum(np.abs(np.gradient(drive.distance_m)) * drive.rate_hz, SLOWEST_MPS)
         n = grid.wave_number_cpm
-        self.seen_cpm = _HIGHEST_OF_RATE * drive.rate_hz / float(np.quantile(self.speed_mps, _FAST_SHARE))
+        self.seen_cpm = SEEN_OF_RATE * drive.rate_hz / float(np.quantile(self.speed_mps, _FAST_SHARE))
         self._averaged = np.where(n <= self.seen_cpm, patch_gain(n, contact_patch_m, grid.spacing_m), 0.0)
         self._lay(1.0)
 

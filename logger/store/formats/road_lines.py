@@ -16,16 +16,13 @@ import numpy as np
 from logger.arrays import Array
 from logger.bounds import DISTANCE
 from logger.errors import BadInput
-from logger.files import read_bounded
-
-MAX_BYTES = 256 << 20
-"""A county's roads; a country's would not be read in a minute, and the page keeps only what is near."""
+from logger.files import MAP_BYTES, read_bounded
 
 
 def read_geojson(path: Path | str) -> dict[str, Any]:
     """A file's object, which has a type. BadInput for a file that cannot be read or is not GeoJSON."""
     try:
-        content = json.loads(read_bounded(path, MAX_BYTES))
+        content = json.loads(read_bounded(path, MAP_BYTES))
     except (ValueError, RecursionError) as error:
         raise BadInput(f"{path}: expected GeoJSON, found text that is not JSON ({error})") from None
     if not isinstance(content, dict) or not isinstance(content.get("type"), str):
