@@ -469,7 +469,7 @@ def diagnosis_json(found: LabDiagnosis) -> dict[str, Any]:
         "explained_power": {"refitted": found.explained[0], "final": found.explained[1],
                             "best_linear": found.best_linear},
         "tolerance": found.tolerance, "coloured_noise": found.coloured,
-        **lab_words.errors_json(found.steps, found.noise_floor_error), "no_better_than_refitted": list(found.no_better),
+        "no_better_than_refitted": list(found.no_better),
         "not_tried": found.not_tried,
         "undetectable": {one.effect.name: one.deviations for one in found.undetectable},
         "unexplained_shape": None if found.shape is None else _shape_json(found.shape),
@@ -491,6 +491,7 @@ def _common_json(found: LabDiagnosis | UnknownRoadDiagnosis) -> dict[str, Any]:
             for one in found.candidates],
         "verdict": list(found.verdict), "unexplained": found.unexplained, "residual_over_noise": 1 + found.excess,
         "steps": [{"step": step.words, "error": step.error} for step in found.steps],
+        **lab_words.errors_json(found.steps, found.noise_floor_error),
     }
 
 
@@ -619,9 +620,8 @@ def same_road_summary(found: UnknownRoadDiagnosis) -> list[str]:
                      "missing.")
     elif not lines:
         lines.append("None of the effects that can be tried without a profile is missing.")
-    by_step = [f"{step.error:.3f} with {step.words.removeprefix('with ')}" for step in found.steps]
-    lines.append(f"NRMSE of each drive over the road estimated from the others: {', '.join(by_step)}. Noise floor: "
-                 f"{found.noise_floor_error:.3f}.")
+    lines += lab_words.error_words(found.steps, found.noise_floor_error,
+                                   "of each drive over the road estimated from the others")
     if found.unexplained:
         cause = ("Something else is missing, perhaps" if found.exact_places else
                  "Either the GPS distances of these drives drift within seconds, or something else is missing, perhaps")

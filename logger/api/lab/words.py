@@ -157,10 +157,10 @@ def _alike(one: Drift, other: Drift) -> bool:
 _ERROR_WORDS = {AS_FILED: "with the vehicle's file unchanged", REFITTED: "with its parameters refitted"}
 
 
-def error_words(steps: Sequence[ErrorStep], floor: float) -> list[str]:
-    """The errors of each step and of the noise alone, and why one rises."""
+def error_words(steps: Sequence[ErrorStep], floor: float, of: str = f"on {JUDGED_ON}") -> list[str]:
+    """The errors of each step ``of`` what no fit saw, and of the noise alone, and why one rises."""
     each = ", ".join(f"{error_and_fit(one.error)} {_ERROR_WORDS.get(one.words, one.words)}" for one in steps)
-    lines = [f"NRMSE on {JUDGED_ON}: {each}. Noise floor: about {error_and_fit(floor)}."]
+    lines = [f"NRMSE {of}: {each}. Noise floor: about {error_and_fit(floor)}."]
     if rises := rising(steps):
         said = enumerated([_ERROR_WORDS.get(one, one) for one in rises], "and")
         lines.append(f"It rises {said}: what fits the other stretches need not fit those held out. On roads a fit also "
