@@ -80,6 +80,15 @@ def counted(number: int, what: str) -> str:
     return f"{number:,} {what}{'s' * (number != 1)}"
 
 
+def span_words(seconds: float) -> str:
+    """A length of time: ``1 h 02 min``, ``17 min 05 s``, ``42 s``."""
+    minutes, rest_s = divmod(round(seconds), 60)
+    hours, minutes = divmod(minutes, 60)
+    if hours:
+        return f"{hours} h {minutes:02d} min"
+    return f"{minutes} min {rest_s:02d} s" if minutes else f"{rest_s} s"
+
+
 def _shown(character: str) -> str:
     if character.isprintable() and not _UNSEEN.match(character):
         return character

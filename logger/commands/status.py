@@ -8,7 +8,7 @@ from typing import Annotated
 from drivers.accelerometers import accelerometers
 from drivers.hardware import port_advice
 from drivers.sources import serial_advice
-from logger.printable import printable
+from logger.printable import printable, span_words
 from logger.question import Checked, Option, Question, Verb
 from logger.service.config import find_config, load_config
 from logger.service.status import SensorStatus, ServiceStatus, StorageStatus, process_exists, read_status, trouble
@@ -62,7 +62,7 @@ def screen(status: ServiceStatus | None, fault: str | None) -> list[str]:
              "stopping": "is stopping"}
     writes = f", but writes NOTHING: {status.storage.trouble}" if status.storage.trouble else ""
     lines = [
-        f"ridelog {words[status.state]}{writes}, up {_span(status.uptime_s)}",
+        f"ridelog {words[status.state]}{writes}, up {span_words(status.uptime_s)}",
         "",
         _sensor_line("accelerometer", status.accelerometer, "samples"),
         _sensor_line("GPS", status.gps, _fix_words(status)),
@@ -105,7 +105,7 @@ def _storage_advice(storage: StorageStatus) -> list[str]:
             # a service that was started on it sees it through a mount of its own, which stays read-only
             cure = ("Mount it writable (sudo mount -o remount,rw /); if this persists: sudo systemctl restart ridelog. "
                     "If it happens again, copy the logs away (plug in the USB stick): the card is dying, replace it")
-        steps.append(f"Log: not written for {_span(storage.since_s)}: {storage.trouble}. {storage.rows_waiting} rows "
+        steps.append(f"Log: not written for {span_words(storage.since_s)}: {storage.trouble}. {storage.rows_waiting} rows "
                      f"wait in memory and are lost if the power goes. {cure}.")
     if storage.rows_lost:
         steps.append(f"Log: {storage.rows_lost} rows were lost while they could not be written.")
@@ -132,7 +132,7 @@ def _sensor_advice(name: str, sensor: SensorStatus) -> list[str]:
     kind = accelerometers().get(sensor.driver)
     check = serial_advice(sensor.state) if kind is None else kind.advice(sensor.state)
     board = f" {port_advice(sensor.place)}".rstrip()
-    return [f"{name}: {sensor.state} for {_span(sensor.since_s)} at {sensor.place}; {check}.{board}{'.' * bool(board)}"
+    return [f"{name}: {sensor.state} for {span_words(sensor.since_s)} at {sensor.place}; {check}.{board}{'.' * bool(board)}"
             f"{error}"]
 
 
@@ -166,11 +166,3 @@ def _window_words(status: ServiceStatus) -> str:
         " ".join(window.flags),
     ]
     return ", ".join(value for value in values if value)
-
-
-def _span(seconds: float) -> str:
-    minutes, rest = divmod(int(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    if hours:
-        return f"{hours} h {minutes} min"
-    return f"{minutes} min {rest} s" if minutes else f"{rest} s"

@@ -27,7 +27,7 @@ import numpy.typing as npt
 
 from logger.chart_data import Array
 from logger.comfort.iso2631 import COMFORT_WORDS
-from logger.printable import counted
+from logger.printable import counted, span_words
 from logger.records import WindowRecord
 from logger.report import document as doc
 from logger.report.placed import MOST_ROWS, PlacesPassed, places_passed
@@ -46,7 +46,6 @@ from logger.report.summary import (
     expected_square,
     iri_words,
     place_words,
-    span_words,
     summarise,
 )
 from logger.store.log.log_reader import LoggedFile, along_m, joined, length_m, split_drives, utc

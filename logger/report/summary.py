@@ -16,7 +16,7 @@ from typing import Any
 
 from logger.comfort.iso2631 import COMFORT_WORDS
 from logger.geodesy import apart_m
-from logger.printable import counted
+from logger.printable import counted, span_words
 from logger.records import WindowRecord
 from logger.roads.iso8608 import CLASS_GD_N0_CM3, iri_from_gd_n0
 from logger.store.log.log_reader import along_m, end_utc_us, iso_utc, length_m, split_drives, utc
@@ -213,15 +213,6 @@ def screen(summary: DriveSummary, encoding: str) -> str:
     lines += ["Comfort inside (ISO 2631)", *_bars(summary.comfort, comfort_words, drawn), ""]
     lines += ["Roughest places", *_places(summary.roughest)]
     return "\n".join(lines) + "\n"
-
-
-def span_words(seconds: float) -> str:
-    """A length of time: ``1 h 02 min``, ``17 min 05 s``, ``42 s``."""
-    minutes, rest_s = divmod(round(seconds), 60)
-    hours, minutes = divmod(minutes, 60)
-    if hours:
-        return f"{hours} h {minutes:02d} min"
-    return f"{minutes} min {rest_s:02d} s" if minutes else f"{rest_s} s"
 
 
 def distance_words(distance_m: float) -> str:

@@ -1,6 +1,7 @@
 """The screen after a drive: it says the figures, in any encoding."""
 
-from logger.report.summary import date_words, distance_words, screen, span_words, summarise
+from logger.printable import span_words
+from logger.report.summary import date_words, distance_words, screen, summarise
 
 ROUGH = {3: {"iri_m_per_km": 14.2, "iri_std_m_per_km": 2.1, "iri_class": "D", "comfort": "very_uncomfortable"}}
 

@@ -90,7 +90,7 @@ def test_the_screen_of_a_healthy_service_says_so() -> None:
     late = replace(STATUS, receiver_delay="0.14 ± 0.02 s, learnt over 3 drives")
     assert "  receiver delay  0.14 ± 0.02 s, learnt over 3 drives" in screen(late, None)
     text = "\n".join(screen(STATUS, None))
-    assert "is recording, up 1 h 2 min" in text
+    assert "is recording, up 1 h 02 min" in text
     assert "72 km/h, IRI 3.2 m/km, a little uncomfortable, time_unset" in text
     assert "all is well" in text
 
@@ -115,7 +115,7 @@ def test_the_screen_says_what_to_do_next(change: dict[str, object], step: str) -
 
 def test_a_service_that_cannot_write_says_so_in_the_first_line() -> None:
     lines = screen(replace(STATUS, storage=StorageStatus("the disk has become read-only", 70.0, 12)), None)
-    assert lines[0] == "ridelog is recording, but writes NOTHING: the disk has become read-only, up 1 h 2 min"
+    assert lines[0] == "ridelog is recording, but writes NOTHING: the disk has become read-only, up 1 h 02 min"
 
 
 def test_without_a_service_the_screen_says_how_to_start_one() -> None:
