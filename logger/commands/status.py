@@ -105,8 +105,8 @@ def _storage_advice(storage: StorageStatus) -> list[str]:
             # a service that was started on it sees it through a mount of its own, which stays read-only
             cure = ("Mount it writable (sudo mount -o remount,rw /); if this persists: sudo systemctl restart ridelog. "
                     "If it happens again, copy the logs away (plug in the USB stick): the card is dying, replace it")
-        steps.append(f"Log: not written for {span_words(storage.since_s)}: {storage.trouble}. {storage.rows_waiting} rows "
-                     f"wait in memory and are lost if the power goes. {cure}.")
+        steps.append(f"Log: not written for {span_words(storage.since_s)}: {storage.trouble}. {storage.rows_waiting} "
+                     f"rows wait in memory and are lost if the power goes. {cure}.")
     if storage.rows_lost:
         steps.append(f"Log: {storage.rows_lost} rows were lost while they could not be written.")
     if storage.recording_trouble:
@@ -132,8 +132,8 @@ def _sensor_advice(name: str, sensor: SensorStatus) -> list[str]:
     kind = accelerometers().get(sensor.driver)
     check = serial_advice(sensor.state) if kind is None else kind.advice(sensor.state)
     board = f" {port_advice(sensor.place)}".rstrip()
-    return [f"{name}: {sensor.state} for {span_words(sensor.since_s)} at {sensor.place}; {check}.{board}{'.' * bool(board)}"
-            f"{error}"]
+    return [f"{name}: {sensor.state} for {span_words(sensor.since_s)} at {sensor.place}; {check}.{board}"
+            f"{'.' * bool(board)}{error}"]
 
 
 def _settings_advice(sensor: SensorStatus) -> list[str]:
