@@ -8,7 +8,7 @@ from __future__ import annotations
 from cmath import phase
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from math import degrees, floor, isfinite, log10
+from math import degrees
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -31,7 +31,7 @@ from logger.modal.mode import FoundMode, ModalResult, pole_rows
 from logger.printable import counted
 from logger.question import COMMON_IRI, COMMON_SPEED_MPS, IRI, SPEED, function
 from logger.report.blocks import SHOWN_ROWS, Block, Blocks, Lines, Section, Table
-from logger.report.quantities import known
+from logger.report.quantities import known, measured
 from logger.runs import READING, SKIP_S
 from logger.store.formats import record_checks
 from logger.store.formats.drive_file import header_of
@@ -375,7 +375,7 @@ _HEADS = ("mode", "frequency Hz", "damping %")
 
 def _mode_rows(modes: Iterable[tuple[float, float, float, float]]) -> Iterator[tuple[str, str, str]]:
     for number, (hz, hz_std, ratio, ratio_std) in enumerate(modes, start=1):
-        yield str(number), with_error(hz, hz_std), with_error(100 * ratio, 100 * ratio_std)
+        yield str(number), measured(hz, hz_std), measured(100 * ratio, 100 * ratio_std)
 
 
 def blocks(result: ModalResult, record: ChannelRecord, name: str) -> Iterator[Block]:
@@ -394,16 +394,6 @@ def blocks(result: ModalResult, record: ChannelRecord, name: str) -> Iterator[Bl
         yield "No mode: nothing in this record exceeds noise."
     yield Section("Rejected", [Table(("Hz", ""), [
         (f"{one.frequency_hz:.4g}", one.reason) for one in result.rejected], (1,), SHOWN_ROWS)])
-
-
-def with_error(value: float, std: float) -> str:
-    """A value with as many decimals as its error allows."""
-    if not isfinite(value):
-        return "not known"
-    if not isfinite(std) or std <= 0:
-        return f"{value:.4g}"
-    decimals = min(9, max(0, 1 - floor(log10(std))))
-    return f"{value:.{decimals}f} ± {std:.{decimals}f}"
 
 
 def _shape_words(mode: FoundMode) -> str:

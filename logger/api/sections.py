@@ -26,7 +26,7 @@ from logger.question import function
 from logger.records import WindowRecord
 from logger.report.blocks import Block, Blocks, Lines, Section, Table, area_blocks
 from logger.report.placed import column, iri_errors, of_sections, placed, trace_of
-from logger.report.quantities import UNITS, DisplayUnits, area_values, known
+from logger.report.quantities import UNITS, DisplayUnits, area_values, fixed, known
 from logger.report.summary import counts, expected_square
 from logger.roads.iri import Area, areas
 from logger.roads.iso8608 import iri_class
@@ -300,12 +300,9 @@ def _rows(one: DriveSections, units: DisplayUnits) -> Iterator[tuple[str, ...]]:
             one.condition, zip(*(each.tolist() for each in columns), strict=True), strict=True):
         (_, unit_m), (_, iri_scale), (_, speed_scale) = units.length, units.iri, units.speed
         yield (f"{start_m / unit_m:.{units.length_decimals}f}", f"{end_m / unit_m:.{units.length_decimals}f}",
-               f"{known_m / (end_m - start_m):.0%}", _number(iri / iri_scale, units.iri_decimals),
-               _number(std / iri_scale, units.iri_decimals + 1), word, _number(a_w, 2), _number(speed / speed_scale, 0))
-
-
-def _number(value: float, decimals: int) -> str:
-    return f"{value:.{decimals}f}" if isfinite(value) else "-"
+               f"{known_m / (end_m - start_m):.0%}", fixed(iri / iri_scale, units.iri_decimals, "-"),
+               fixed(std / iri_scale, units.iri_decimals + 1, "-"), word, fixed(a_w, 2, "-"),
+               fixed(speed / speed_scale, 0, "-"))
 
 
 def _length_words(length_m: float) -> str:

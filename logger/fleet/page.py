@@ -44,7 +44,7 @@ from logger.printable import counted
 from logger.report import document as doc
 from logger.report.document import tiles
 from logger.report.placed import damaged
-from logger.report.quantities import known
+from logger.report.quantities import fixed, known
 from logger.report.summary import distance_words
 from logger.roads.sections import FAIR_TO_IN_PER_MI, FEDERAL_WORDS, GOOD_BELOW_IN_PER_MI, federal_condition
 from logger.store.log.log_reader import iso_utc, utc
@@ -148,7 +148,7 @@ def _roads(roads: RoadTable) -> list[str]:
              "  place                    IRI [m/km]      cars  passes  a_w [m/s2]  last seen   visit"]
     return lines + [f"  {roads.lat_deg[one]:10.5f} {roads.lon_deg[one]:11.5f}  {roads.iri_m_per_km[one]:5.2f} "
                     f"{error_words(roads.iri_std_m_per_km[one]):7}  {roads.cars[one]:6d}  {roads.passes[one]:6.0f}  "
-                    f"{_number(roads.a_w_mps2[one], 2):>10}  {utc(int(roads.last_us[one])):%Y-%m-%d}  "
+                    f"{fixed(roads.a_w_mps2[one], 2):>10}  {utc(int(roads.last_us[one])):%Y-%m-%d}  "
                     f"{roads.visit[one].replace('|', ', ')}".rstrip() for one in order]
 
 
@@ -172,10 +172,6 @@ def _changes(roads: RoadTable) -> list[str]:
 def error_words(std: float) -> str:
     """A standard error behind its value: "± 0.12"; nothing where it is not known."""
     return f"± {std:.2f}" if isfinite(std) else ""
-
-
-def _number(value: float, decimals: int) -> str:
-    return f"{value:.{decimals}f}" if isfinite(value) else ""
 
 
 _NUMBERS = ("lat_deg", "lon_deg", "heading_deg", "length_m", "passes", "iri_m_per_km", "iri_std_m_per_km",

@@ -31,6 +31,7 @@ from logger.printable import counted, span_words
 from logger.records import WindowRecord
 from logger.report import document as doc
 from logger.report.placed import MOST_ROWS, PlacesPassed, places_passed
+from logger.report.quantities import fixed
 from logger.report.summary import (
     COMFORT_NAMES,
     IRI_CLASSES,
@@ -49,6 +50,7 @@ from logger.report.summary import (
     summarise,
 )
 from logger.store.log.log_reader import LoggedFile, along_m, joined, length_m, split_drives, utc
+from logger.units import KMH_MPS
 from logger.vehicle.uncertain import not_known
 from logger.vehicle.vehicle import GENERIC
 
@@ -142,9 +144,9 @@ def _tiles(summary: DriveSummary) -> doc.Html:
     return doc.tiles([
         ("Distance", distance_words(summary.distance_m), ""),
         ("Time", span_words(summary.duration_s), ""),
-        ("Mean speed", _number(summary.mean_speed_mps, 0, factor=3.6), "km/h"),
-        ("Mean roughness (IRI)", _number(summary.mean_iri_m_per_km, 1), "m/km"),
-        (doc.Html("Comfort inside (a<sub>w</sub>)"), _number(summary.a_w_mps2, 2), "m/s²"),
+        ("Mean speed", _kmh(summary.mean_speed_mps), "km/h"),
+        ("Mean roughness (IRI)", fixed(summary.mean_iri_m_per_km, 1), "m/km"),
+        (doc.Html("Comfort inside (a<sub>w</sub>)"), fixed(summary.a_w_mps2, 2), "m/s²"),
     ])
 
 
@@ -166,8 +168,8 @@ def _shares(shares: Sequence[Share], names: tuple[str, ...], words_of: Callable[
 
 def _places_section(records: Sequence[WindowRecord], places: Sequence[RoughWindow]) -> doc.Html:
     rows = [(number_button(index, number), str(place.drive), _instant(place.utc_us), _geo(place),
-             distance_words(place.along_m), iri_words(place), _number(place.speed_mps, 0, factor=3.6),
-             _number(place.a_w_mps2, 2), comfort_words(place.comfort), " ".join(place.flags))
+             distance_words(place.along_m), iri_words(place), _kmh(place.speed_mps),
+             fixed(place.a_w_mps2, 2), comfort_words(place.comfort), " ".join(place.flags))
             for number, (index, place) in enumerate(zip(_numbers(records, places), places, strict=True), start=1)]
     if not rows:
         return doc.EMPTY
@@ -198,7 +200,7 @@ def _geo(place: RoughWindow) -> doc.Html | str:
 
 def _drives_section(drives: Sequence[Sequence[WindowRecord]]) -> doc.Html:
     rows = [(str(number), date_words(one), distance_words(one.distance_m), span_words(one.duration_s),
-             _number(one.mean_iri_m_per_km, 1), _number(one.a_w_mps2, 2))
+             fixed(one.mean_iri_m_per_km, 1), fixed(one.a_w_mps2, 2))
             for number, one in enumerate(map(summarise, drives), start=1)]
     return doc.section("Drives",
                        doc.grid(("#", "When", "Distance", "Time", "Mean IRI [m/km]", _A_W), rows, words=(0, 1)))
@@ -261,8 +263,8 @@ def _settings_section(files: Sequence[LoggedFile]) -> doc.Html:
     return doc.html("<details><summary>Settings, vehicle and versions</summary>{}</details>", blocks)
 
 
-def _number(value: float | None, decimals: int, factor: float = 1.0) -> str:
-    return "" if value is None else f"{value * factor:.{decimals}f}"
+def _kmh(speed_mps: float | None) -> str:
+    return fixed(speed_mps and speed_mps / KMH_MPS, 0)
 
 
 def _instant(utc_us: int | None) -> str:

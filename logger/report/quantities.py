@@ -40,9 +40,16 @@ def _product(words: str) -> str:
                     for word in words.split("_") if word)
 
 
+def fixed(value: float | None, decimals: int, absent: str = "") -> str:
+    """A value with so many decimals, or what stands for one that is not known."""
+    return absent if value is None or not isfinite(value) else f"{value:.{decimals}f}"
+
+
 def measured(value: float, error: float | None) -> str:
     """A value with its standard error, in no more digits than it deserves: ``85 ± 4``, ``1.61e6 ± 0.04e6``."""
-    if error is None or not isfinite(error) or not error > 0 or not isfinite(value):
+    if not isfinite(value):
+        return "not known"
+    if error is None or not isfinite(error) or not error > 0:
         return f"{value:.3g}".replace("e+0", "e")
     decimals = 1 - floor(log10(error)) - (error / 10.0 ** floor(log10(error)) >= 2)
     size = max(abs(value), error)

@@ -35,7 +35,7 @@ from logger.question import function
 from logger.report import document as doc
 from logger.report.blocks import SHOWN_ROWS, Block, Blocks, Bullets, Detail, Hint, Linked, Section, Table, page
 from logger.report.charts import chart
-from logger.report.quantities import chance, finite, known, numbers_of, signal_errors, some, unit_of
+from logger.report.quantities import chance, finite, fixed, known, numbers_of, signal_errors, some, unit_of
 from logger.runs import Run, are_on_rig, normalised_rms_error, runs_left_out, short_names
 from logger.store.formats import vehicle_file
 from logger.vehicle.effect import Chosen, Effect
@@ -419,7 +419,7 @@ def _places(standing: Standing) -> Section:
     along = Curves("Residual along the road", "distance [m]", f"residual, r.m.s. [{unit}]", tuple(lines))
     worst = standing.where.worst_places(SHOWN_ROWS) if standing.where.place else []
     rows = [(names[part.name], f"{part.low:g} to {part.high:g}", f"{part.share:.1%}", f"{part.residual_mps2:.3g}",
-             lab_words.error_text(part, 3)) for part in worst]
+             fixed(part.error, 3, "-")) for part in worst]
     return Section("By place", [*([along] if lines else []), Table(
         ("Run", "From, to [m]", "Share of the residual", f"Residual [{unit}]", "NRMSE"), rows)])
 
@@ -463,8 +463,8 @@ def _table(title: str, unit: str, plain: Sequence[Part], refitted: Sequence[Part
     """Shares and errors of both standings; the bounds of the parts are those of the refitted one."""
     rows = [(part.name, f"{part.low:.3g} to {part.high:.3g}",
              Linked("", doc.html('<div class="bar"><span class="f0" style="width:{:.1%}"></span></div>', part.share)),
-             f"{part.share:.1%}", f"{one.share:.1%}" if one else "", lab_words.error_text(part, 3),
-             lab_words.error_text(one, 3) if one else "") for one, part in lab_words.paired(plain, refitted)]
+             f"{part.share:.1%}", f"{one.share:.1%}" if one else "", fixed(part.error, 3, "-"),
+             fixed(one.error, 3, "-") if one else "") for one, part in lab_words.paired(plain, refitted)]
     heads = ("Band", f"From, to [{unit}]", "", "Share", "unchanged", "NRMSE", "unchanged")
     return Section(title, [Table(heads, rows, (0, 2))])
 

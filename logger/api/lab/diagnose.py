@@ -45,6 +45,7 @@ from logger.report.quantities import (
     chance,
     enumerated,
     finite,
+    fixed,
     measured,
     numbers_of,
     signal_errors,
@@ -443,8 +444,8 @@ def table(found: LabDiagnosis | UnknownRoadDiagnosis) -> Iterator[tuple[str, str
     by_name = {one.effect.name: one for one in found.missing}
     for one in found.candidates:
         name = one.effect.name
-        yield (name, f"{one.error:.3f}{'' if one.fitted else ', not fitted'}", chance(one.p_value),
-               numbers_of(by_name.get(name, one.one)))
+        words = [numbers_of(by_name.get(name, one.one)), "" if one.fitted else "not fitted"]
+        yield name, f"{one.error:.3f}", chance(one.p_value), ", ".join(filter(None, words))
 
 
 # --- for a program ---
@@ -590,7 +591,7 @@ def _force(one: ForceCurve) -> Curves:
 
 def _where(shape: Shape) -> Detail:
     """By frequency, and along the way."""
-    rows = [(part.name, f"{part.low:.3g} to {part.high:.3g}", f"{part.share:.1%}", lab_words.error_text(part, 2))
+    rows = [(part.name, f"{part.low:.3g} to {part.high:.3g}", f"{part.share:.1%}", fixed(part.error, 2, "-"))
             for part in shape.where.frequency]
     drawn: list[Block] = [Table(("Band", "From, to [Hz]", "Share of the residual", "NRMSE"), rows)]
     if shape.line is not None and shape.line.found:

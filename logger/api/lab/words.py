@@ -48,11 +48,6 @@ def line_sentence(line: SpatialLine) -> str:
     return f"It repeats every {every_m:.2f} m of road at any speed (clearest in {line.run}).{wheel}"
 
 
-def error_text(part: Part, digits: int) -> str:
-    """The error of a part with so many digits behind the point; a dash where there is none."""
-    return f"{part.error:.{digits}f}" if np.isfinite(part.error) else "-"
-
-
 def paired(before: Sequence[Part], after: Sequence[Part]) -> list[tuple[Part | None, Part]]:
     """Parts with those of another model of the same runs: bands by their names, as a car's own vibrations move with its
     numbers; others by their ends. None where there is no such part."""

@@ -6,8 +6,9 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from logger.api.lab.words import error_text, paired
+from logger.api.lab.words import paired
 from logger.lab.residuals.breakdown import Part, breakdown
+from logger.report.quantities import fixed
 from logger.runs import Run, short_names
 
 from ...support.lab.runs_with_residual import CAR, RATE_HZ, a_run, beside_with
@@ -62,7 +63,7 @@ def test_where_nothing_was_measured_there_is_no_error() -> None:
 
     where = breakdown(beside_with(silent))
     unknown = [part for part in where.place if not np.isfinite(part.error)]
-    assert unknown and all(part.residual_mps2 > 0 and error_text(part, 3) == "-" for part in unknown)
+    assert unknown and all(part.residual_mps2 > 0 and fixed(part.error, 3, "-") == "-" for part in unknown)
     assert all(part.error > 0 for part in where.place if part not in unknown)
 
 
