@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from logger.api.drives import run_on_road as read_run
 from logger.api.lab.bench import known_effects, silent
 from logger.api.lab.checks import check_model, checked_runs, predicted
 from logger.commands.main import main
@@ -17,7 +18,6 @@ from logger.lab.likelihood.priors import Tolerance
 from logger.lab.road_match import match_below_bounce
 from logger.shipped import vehicle_file
 from logger.simulation.virtual_drive import SimulatedRuns
-from logger.store.formats.drive_file import read_run
 from logger.store.formats.vehicle_file import read_model
 from logger.vehicle.models import structure_of
 from logger.vehicle.modes import undamped_frequencies_hz

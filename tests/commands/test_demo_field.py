@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from logger.api.drives import run_on_road as read_run
 from logger.commands.main import main
 from logger.errors import BadInput
-from logger.store.formats.drive_file import read_run
 from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.vehicle_file import read_model
 from tests.support.command import called

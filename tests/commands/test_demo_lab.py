@@ -9,8 +9,8 @@ from subprocess import CompletedProcess
 import numpy as np
 import pytest
 
+from logger.api.drives import run_on_road as read_run
 from logger.commands import demo
-from logger.store.formats.drive_file import read_run
 
 from ..support.command import called
 from ..support.drives import lab_drives

@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from logger.api.drives import run_on_road as read_run
 from logger.commands.main import main
 from logger.errors import BadInput
-from logger.store.formats.drive_file import read_run
 from logger.store.formats.effect_file import shipped_effects
 
 from ..support.lab.runs_with_effects import FEW, OWN, named, out_of_balance, write_runs

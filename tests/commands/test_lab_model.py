@@ -10,6 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
+from logger.api.drives import run_on_road as read_run
 from logger.api.lab.bench import sought_effects
 from logger.api.lab.checks import checked_runs
 from logger.api.shown import check_out
@@ -17,7 +18,7 @@ from logger.commands.main import main
 from logger.errors import BadInput
 from logger.profiles.track import Track
 from logger.shipped import vehicle_file
-from logger.store.formats.drive_file import read_run, write_drive, write_profile
+from logger.store.formats.drive_file import write_drive, write_profile
 from logger.vehicle.vehicle import Vehicle
 
 from ..support.command import called

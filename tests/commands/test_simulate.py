@@ -10,13 +10,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from logger.api.drives import run_on_road as read_run
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.roads.obstacles import speed_bump
 from logger.shipped import vehicle_file
-from logger.store.formats.drive_file import DriveOnRoad, read_run, write_profile
+from logger.store.formats.drive_file import DriveOnRoad, write_profile
 from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose, recorded, respond

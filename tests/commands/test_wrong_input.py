@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 import yaml
 
+from logger.api.drives import run_on_road as read_run
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.profiles.track import Track
 from logger.shipped import vehicle_path
-from logger.store.formats.drive_file import read_run, write_profile
+from logger.store.formats.drive_file import write_profile
 from logger.store.formats.effect_file import shipped_effects
 
 from ..support.lab.runs_with_effects import FEW, write_runs

@@ -19,6 +19,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from logger.api.drives import run_on_road as read_run
 from logger.api.lab.bench import known_effects, silent
 from logger.api.lab.checks import check_model, checked_runs
 from logger.errors import BadInput
@@ -27,7 +28,6 @@ from logger.lab.likelihood.priors import Tolerance
 from logger.profiles.track import Track
 from logger.runs import Run, normalised_rms_error
 from logger.simulation.virtual_drive import SimulatedRuns
-from logger.store.formats.drive_file import read_run
 from logger.store.formats.vehicle_file import CarModel, read_model
 from logger.units import STANDARD_GRAVITY_MPS2
 from logger.vehicle.compose import compose

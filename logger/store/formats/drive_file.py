@@ -36,7 +36,6 @@ from logger.store.formats.profile_file import (
     PROFILE_NAME,
     Wheelpaths,
     read_excitation,
-    read_profile,
 )
 from logger.store.formats.record_file import (
     DRIVE_NAME,
@@ -261,26 +260,10 @@ class DriveOnRoad(Drive):
     track: Track | Excitation
 
 
-def read_run(folder: Path | str) -> DriveOnRoad:
-    """Read a folder with ``drive.csv`` and ``profile.csv`` or, of a rig, ``excitation.csv``, and ``run.yaml`` if there
-    is one.
-
-    Times come back on the even grid that their digits are a rounding of.
-
-    Raises BadInput ("file:line: expected ..., found ...") for a file that is missing or not what it should be.
-    """
-    path = Path(folder)
-    if not path.is_dir():
-        raise BadInput(f"{folder}: expected a folder with {DRIVE} and {PROFILE} (or {EXCITATION})")
-    timed = driven_by_time(path)
-    drive = drive_in(path, timed)
-    track = excitation_beside(drive) if timed else track_of(read_profile(path / PROFILE, judged=True))
-    return DriveOnRoad(**vars(drive), track=track)
-
-
 def drive_in(folder: Path, timed: bool) -> Drive:
-    """The drive of a run's folder, on a rig (``timed``) or over a road, with what its ``run.yaml`` says. BadInput as
-    ``read_run``."""
+    """The drive of a run's folder, on a rig (``timed``) or over a road, with what its ``run.yaml`` says.
+    Times come back on the even grid that their digits are a rounding of. BadInput ("file:line: expected ..., found
+    ...") for a file that is missing or not what it should be."""
     facts = read_run_facts(folder)
     if facts.signals or timed:
         columns = header_of(folder / DRIVE)

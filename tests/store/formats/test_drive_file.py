@@ -7,9 +7,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from logger.api.drives import run_on_road as read_run
 from logger.errors import BadInput
 from logger.profiles.track import Track
-from logger.store.formats.drive_file import read_run, read_speeds, write_drive, write_profile
+from logger.store.formats.drive_file import read_speeds, write_drive, write_profile
 
 HEADER = "t_s,accel_z_mps2,speed_mps,distance_m"
 TRACK = Track(0.1, np.linspace(0, 1, 21) ** 2, 4.0)
@@ -97,7 +98,7 @@ def test_what_is_missing_is_named(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=r"drive\.csv: expected a readable file"):
         read_run(tmp_path)
     write_drive(tmp_path / "drive.csv", columns())
-    with pytest.raises(BadInput, match=r"profile\.csv: expected a readable file"):
+    with pytest.raises(BadInput, match=r"expected a run with the profile"):
         read_run(tmp_path)
 
 

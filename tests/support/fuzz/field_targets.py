@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from logger.api.datasets.lira_map import ProfilerPass
+from logger.api.drives import run_on_road as read_run
 from logger.api.extraction import CsvSettings, recorded_csv
 from logger.errors import BadInput
 from logger.files import json_sha256
@@ -28,7 +29,7 @@ from logger.store.export.manifest import Manifest, list_blocks, manifest_blocks,
 from logger.store.export.sticks import read_note
 from logger.store.formats import record_checks, vehicle_file
 from logger.store.formats.csv_table import columns_of
-from logger.store.formats.drive_file import read_columns, read_run, read_run_facts, read_speeds
+from logger.store.formats.drive_file import read_columns, read_run_facts, read_speeds
 from logger.store.formats.mat_file import read_arrays, read_geopoint
 from logger.store.formats.profile_file import read_excitation, read_places, read_profile
 from logger.store.formats.record_file import read_columns as read_record_columns

@@ -26,11 +26,11 @@ from drivers.accelerometers.pasco import PascoDecoder
 from drivers.dump import open_dump
 from drivers.nmea import NmeaDecoder
 from drivers.wire_profiles import FrameLayout, LineLayout, WireProfile, load_profile, shipped_profiles
+from logger.api.drives import run_on_road as read_run
 from logger.errors import BadInput
 from logger.records import WindowRecord
 from logger.service.config import load_config
 from logger.service.wiring import config_for_dump
-from logger.store.formats.drive_file import read_run
 from logger.store.formats.profile_file import read_profile
 from logger.store.formats.record_checks import read_channels
 from logger.store.formats.record_file import read_record
