@@ -261,15 +261,10 @@ def beside_limit(noise: float, range_g: int, mph: int, level: float, extent: Ext
     road = iso_road(level, extent.windows * WINDOW_M, FIRST_SEED + 20_000 + number, 2.0)
     drive = steady_drive(rav4(), road, mph * MPH_MPS, LEAD_S, GRID_HZ)
     readings, clipped = chip.read(drive.accel_mps2, np.random.default_rng([FIRST_SEED, range_g, mph, number]))
-    lead, speed_mps = round(LEAD_S * GRID_HZ), float(drive.speed_mps[0])
-    lap = slice(lead, lead + round(road.length_m / speed_mps * GRID_HZ))
-    ends = np.where(clipped[lap], np.sign(readings[lap] - np.median(readings)), 0.0)
-    low = np.where(ends < 0, -np.inf, readings[lap] - step / 2)
-    high = np.where(ends > 0, np.inf, readings[lap] + step / 2)
     way_m = drive.place_m - drive.place_m[0]
     windows = np.arange(np.ceil(-drive.place_m[0] / WINDOW_M), np.floor((road.length_m - drive.place_m[0]) / WINDOW_M))
     begin_m = drive.place_m[0] + windows * WINDOW_M
-    best = best_values(rav4(), Lap(road, speed_mps, low, high, noise), begin_m, begin_m + WINDOW_M, extent.sweeps)
+    best = best_values(rav4(), Lap.of(drive, chip, readings, clipped), begin_m, begin_m + WINDOW_M, extent.sweeps)
     found = estimates(Sensor(noise, step), readings, clipped, way_m, WINDOW_M)
     estimate = [found.get(window, (np.nan, np.nan))[0] for window in windows.astype(int).tolist()]
     return np.stack([road.iri(begin_m, begin_m + WINDOW_M), estimate, *best], axis=1)
