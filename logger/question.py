@@ -401,7 +401,7 @@ class LongQuestion(Question):
     """One whose answer takes a while."""
 
     progress: Annotated[Notify, "called with what is under way, such as print"] = silent
-    warn: Annotated[Notify, "called with what should be known before it takes long"] = silent
+    warn: Annotated[Notify, "called with what should be known before a long computation"] = silent
 
     stays: ClassVar[bool] = False
     """Whether what is under way stays on the screen."""

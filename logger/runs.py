@@ -406,7 +406,8 @@ def no_readings(usable: Array | None) -> tuple[LeftOut, ...]:
     """What of samples (n,) is no reading, by what they are, as in ``Run``."""
     return () if usable is None else (
         LeftOut(float(np.count_nonzero(usable == NO_READING)), "sample", "without a reading"),
-        LeftOut(float(np.count_nonzero(usable == CLIPPED)), "sample", "at an end of the sensor's range, but as bounds"))
+        LeftOut(float(np.count_nonzero(usable == CLIPPED)), "sample",
+                "at an end of the sensor's range, except as bounds"))
 
 
 def short_names(runs: Sequence[Run]) -> dict[str, str]:

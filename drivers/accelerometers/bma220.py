@@ -278,7 +278,7 @@ class Bma220(ConfiguredChip):
             self._sleep(TOGGLE_WAIT_S)
             if runs:
                 return
-        raise BadReply(f"BMA220 at 0x{chip:02X} does not come out of {toggle.name}: two reads answered 0x00")
+        raise BadReply(f"BMA220 at 0x{chip:02X} stays in {toggle.name}: two reads answered 0x00")
 
 
 def mps2_per_count(range_g: int) -> float:

@@ -158,7 +158,7 @@ class EstimateQuestion(LongQuestion):
             beside = {path for path in taken if path.parent == folder} | {*(
                 folder.iterdir() if folder.is_dir() else ())}
             if clash := [path for path in beside if part.fullmatch(path.name) and path.resolve() in taken]:
-                raise BadInput(f"--profile-out {profile}: expected another name, its parts could be written over "
+                raise BadInput(f"--profile-out {profile}: expected another name: its parts could overwrite "
                                f"{clash[0]}")
 
 

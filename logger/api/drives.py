@@ -415,15 +415,15 @@ def blocks(found: Assessment, summary: dict[str, Any]) -> Iterator[Block]:
         details.append("The distance ran backwards in places; estimate recomputed it from the speed, which moved it by "
                        f"up to {summary['distance_moved_m']:.2f} m.")
     if found.road_effects:
-        details.append(f"Compared with the profile as {' and '.join(found.road_effects)} in the vehicle's file "
-                       "changes it.")
+        details.append(f"Compared with the profile as changed by {' and '.join(found.road_effects)} in the vehicle's "
+                       "file.")
     doubts = [hint] if (hint := _unit_hint(found)) else []
     if not summary["answered_count"]:
         yield Lines([f"No IRI: {_unanswered(summary) or 'the drive is shorter than one window'}", *doubts, *details])
         return
     limit = summary["limit"]
     limits = [
-        "The limit (of an estimator that knows road, car and noise exactly): standard error "
+        "The limit (if road, car and noise were known exactly): standard error "
         f"{limit['std_m_per_km']:.2f} m/km at {summary['speed_mps']:.0f} m/s; R2 {limit['r2_iri_1_to_10']:.3f} over "
         f"roads of IRI {LEVELS_IRI[0]:g} to {LEVELS_IRI[-1]:g}, {limit['r2_this_road']:.3f} on a road like this one.",
         "Wavelengths resolved: " + _range_words(found),

@@ -243,7 +243,7 @@ def blocks(drives: Sequence[DriveSections], length_m: float, system: str, locali
            ) -> Iterator[Block]:
     """For a person; with a limit the areas of localized roughness under each drive."""
     if not drives:
-        yield "No row has a distance, or lies on the route: there are no sections."
+        yield "No row has a distance or lies on the route, so there are no sections."
         return
     units = UNITS[system]
     yield Lines(list(_summary(drives, length_m, units)))

@@ -71,7 +71,7 @@ def _rate_hz(text: str) -> float:
     try:
         return float(text)
     except ValueError:
-        raise ValueError("expected a rate in Hz; a file goes before --resample") from None
+        raise ValueError("expected a rate in Hz; put the file before --resample") from None
 
 
 ResampleHz = Annotated[float | None, Option(
@@ -80,7 +80,7 @@ ResampleHz = Annotated[float | None, Option(
     metavar="HZ", read=_rate_hz, bare=0.0)]
 ResampleM = Annotated[float | None, Option(
     "for an unevenly spaced profile: interpolate it linearly, with a sample every M metres. This changes the result, "
-    "which says so",
+    "and the result says so",
     metavar="M")]
 
 

@@ -390,4 +390,4 @@ def blocks(found: Calibrated) -> list[Block]:
                "from IRI"), rows, ()),
         Lines([f"* for windows of {settings.window_m:.4g} m; the other columns are for whole roads.",
                "IRI [m/km] = IRI/rms x r.m.s. vertical acceleration [m/s2]; 68 % lie within the spread.",
-               f"From the IRI in the last column on, ISO 2631-1 calls the ride {_COMFORT_WORD}."])]
+               f"Above the IRI in the last column, ISO 2631-1 calls the ride {_COMFORT_WORD}."])]

@@ -120,7 +120,7 @@ class PlayedDrive:
             verdict = "AGREES" if self.agreement.ok else "does NOT AGREE"
             lines = [f"The log {verdict} with the replay.", *lines, *_agreement_text(self.agreement)]
         else:
-            lines.append("Compare when its log is here: ridelog hil DUMP --log DIR --config FILE, with its settings.")
+            lines.append("To compare its log with a replay: ridelog hil DUMP --log DIR --config FILE (its settings).")
         return "\n".join(lines)
 
 

@@ -108,7 +108,7 @@ def _wants_a_law() -> bool:
     """What the user says."""
     while True:
         try:
-            answer = input("\nNo known effect explains it all. Learn a law out of the data, which takes minutes? "
+            answer = input("\nNo known effect explains it all. Learn a law from the data (it takes minutes)? "
                            "yes or no: ").strip().lower()
         except EOFError:
             return False

@@ -162,7 +162,7 @@ def _changes(roads: RoadTable) -> list[str]:
         return [f"Whether a {roads.by} has become worse is not known"]
     if not order:
         return [f"No {roads.by} has become worse, as far as these drives show", *power]
-    lines = [f"Became worse: {counted(len(worse), roads.by)} (at most {FALSE_SHARE:.0%} of them falsely)", *power,
+    lines = [f"Became worse: {counted(len(worse), roads.by)} (at most {FALSE_SHARE:.0%} of these are false)", *power,
              "  place                    IRI [m/km]   a year [m/km]    p"]
     return lines + [f"  {roads.lat_deg[one]:10.5f} {roads.lon_deg[one]:11.5f}  {roads.iri_m_per_km[one]:10.2f}  "
                     f"{roads.trend_m_per_km_per_year[one]:+6.2f} ± {roads.trend_std_m_per_km_per_year[one]:.2f}  "

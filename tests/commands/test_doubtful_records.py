@@ -63,7 +63,7 @@ def test_values_in_g_are_refused_and_converted(comfort) -> None:
     in_g = 0.995 + at(EVEN_S, FINE) / 9.80665
     status, _, complaints = comfort(EVEN_S, in_g)
     assert (status, len(complaints)) == (2, 1)
-    assert "found a mean of 0.995, as gravity in g has it: --unit g" in complaints[0]
+    assert "found a mean of 0.995, as of gravity in g: --unit g" in complaints[0]
     status, reported, complaints = comfort(EVEN_S, in_g, "--unit", "g")
     assert (status, complaints) == (0, [])
     assert reported["a_w_mps2"] == pytest.approx(right["a_w_mps2"], rel=1e-4)
@@ -89,7 +89,7 @@ def test_a_record_of_zeros_is_refused(comfort) -> None:
 def test_a_file_behind_the_bare_option_is_no_rate() -> None:
     done = called("comfort", "--resample", "ride.csv")
     assert done.returncode == 2
-    assert "--resample ride.csv: expected a rate in Hz; a file goes before --resample" in done.stderr
+    assert "--resample ride.csv: expected a rate in Hz; put the file before --resample" in done.stderr
 
 
 def test_the_end_of_a_range_is_reported(comfort) -> None:

@@ -84,7 +84,7 @@ def test_the_road_that_an_effect_makes_of_the_profile_is_compared_with(
     assert found["comparison"]["bias"] == pytest.approx(plain["comparison"]["bias"], abs=1e-3)
     assert found["road_effects"] == ["written_low"] and "road_effects" not in plain
     assert main(["estimate", str(tmp_path), "--vehicle", str(car)]) == 0
-    assert "Compared with the profile as written_low in the vehicle's file changes it." in capsys.readouterr().out
+    assert "Compared with the profile as changed by written_low in the vehicle's file." in capsys.readouterr().out
 
 
 def read(run: Path) -> dict[str, np.ndarray]:
@@ -337,7 +337,7 @@ def test_no_file_is_written_over_another(folder: Path, tmp_path: Path) -> None:
     for start, *arguments in ((run, "--profile-out", run / "p.csv"),
                               (run / "drive-3.csv", "--profile-out", run / "drive.csv"),
                               (run, "--out", tmp_path / "new-12.csv", "--profile-out", new)):
-        assert "its parts could be written over" in refusal(start, *map(str, arguments))
+        assert "its parts could overwrite" in refusal(start, *map(str, arguments))
     assert {path: path.read_bytes() for path in (car, *run.iterdir())} == before
     assert sorted(path.name for path in tmp_path.iterdir()) == ["car.yaml", "run"]
 

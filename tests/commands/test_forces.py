@@ -367,7 +367,7 @@ def test_uneven_clocks_are_laid_on_even_times_and_nothing_is_compared_beyond_the
 @pytest.mark.slow
 @pytest.mark.parametrize(("fault", "jitter", "lost", "why"), [
     ("gaps", 0.0, 102, "without a reading"), ("gaps", 0.3, 102, "without a reading"),
-    ("clipped", 0.0, 0.09 * len(TIME_S), "at an end of the sensor's range, but as bounds")])
+    ("clipped", 0.0, 0.09 * len(TIME_S), "at an end of the sensor's range, except as bounds")])
 def test_what_drops_out_or_is_clipped_changes_no_result(
         fault: str, jitter: float, lost: float, why: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Three drop-outs of 48 to 240 ms, also by a clock that is off by a third of a step, and a sensor that is at its

@@ -129,7 +129,7 @@ def test_a_car_s_name_has_to_be_one(tmp_path: Path) -> None:
         done = called("calibrate", "--vehicle", tmp_path / "car.yaml")
         check(done.stderr, word)
         assert done.returncode == 2
-        assert "expected a name of at most 80 characters that can be seen" in done.stderr
+        assert "expected a name of at most 80 printable characters" in done.stderr
 
 
 def test_a_row_s_words_are_a_logger_s(tmp_path: Path) -> None:

@@ -95,7 +95,7 @@ def test_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for arguments, words in (
             ([file], "expected --vehicle with a drive"),
             ([file, "--columns", "accel_z_mps2"], "expected --vehicle with a drive"),
-            ([file, "--columns", "speed_mps", "--method", "era"], "which says how the car went"),
+            ([file, "--columns", "speed_mps", "--method", "era"], "which describes how the car moved"),
             ([file, "--vehicle", "golden-car", "--method", "era"], "fitted to the spectrum"),
             ([str(bare), "--vehicle", "golden-car"], "expected a column speed_mps, or --speed")):
         with pytest.raises(BadInput, match=words):

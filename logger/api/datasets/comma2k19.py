@@ -114,7 +114,7 @@ def _map(drives: list[DrivenWindows]) -> Curves:
 _DOWNLOAD = "clone github.com/commaai/comma2k19 (MIT), which holds a segment in Example_1, or download the whole set"
 STUDY = Study(
     "comma2k19", "A minute of highway in a RAV4: from raw files to rows and a map", "Example_1",
-    "The segment is processed as any recording: extract --csv with the receiver's positions and speed, then estimate "
+    "The segment is processed like any recording: extract --csv with the receiver's positions and speed, then estimate "
     "with the noise learnt. The device sat on the windscreen, where it feels pitch as well; the model's sensor sits "
     "in the middle, unless --vehicle names another car. This was run on the real minute.",
     from_folder("comma2k19", _DOWNLOAD, run), (Item("comma2k19", Word.NOT_REPRODUCIBLE,

@@ -232,7 +232,7 @@ def _repeats(road: ProfiledRoad, window_m: float) -> list[tuple[Any, ...]]:
 _DOWNLOAD = "download LiRA-CD, doi 10.11583/DTU.c.6337148, and unpack it; AutoPi_CAN and ref_data are read"
 STUDY = Study(
     "lira_cd", "Electric cars against the road directorate's profiler, 10 m and 100 m", "IRI of P79",
-    "Each pass is processed as any recording (extract --csv, estimate with the noise learnt). Its windows are placed "
+    "Each pass is processed like any recording (extract --csv, estimate with the noise learnt). Its windows are placed "
     "on the profiler's cells by GPS, then moved by up to 30 m to where they fit best. The parameters of the cars "
     "(Renault Zoe) are not published: the model of a sedan replaces them, unless --vehicle names another. The reader "
     "is tested on small files of the same layout.",

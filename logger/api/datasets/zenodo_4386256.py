@@ -141,7 +141,7 @@ def _together(road: str,
 _DOWNLOAD = "download doi 10.5281/zenodo.4386256 (CC0) and unpack it into one folder"
 STUDY = Study(
     "zenodo_4386256", "Phones at 100 Hz against laser profiles, 10 m and 100 m", "Three roads",
-    "Each trip is processed as any recording: extract --csv --profile aligns it with the laser profile, by the "
+    "Each trip is processed like any recording: extract --csv --profile aligns it with the laser profile, by the "
     "phone's positions and then by the road that the car felt. Then estimate compares its windows with the profile's "
     "exact IRI. The cars' parameters are not published: the model of a sedan replaces them, unless --vehicle names "
     "another. The reader is tested on small files of the same layout.",

@@ -559,7 +559,7 @@ def judgement(found: AddedEffects) -> list[str]:
     elif found.gains:
         lines.append("WARNING: it does not help. The fit improves by more than noise alone would, but the NRMSE on "
                      f"{JUDGED_ON} rises from {found.error_refitted:.4f} to {found.error_after:.4f}, and so does the "
-                     "residual weighed by its noise: the effect imitates something else.")
+                      "residual weighted by its noise: the effect imitates something else.")
     else:
         lines.append(f"WARNING: it does not help. The probability that noise alone improves the fit as much is "
                      f"{chance(found.p_value)}; these runs are no reason to keep it.")

@@ -93,8 +93,8 @@ def _beside(found: data_sets.Improved, ours: Sequence[float]) -> Table:
 _DOWNLOAD = "download the EMPS files from nonlinearbenchmark.org and unpack them; DATA_EMPS is read"
 STUDY = Study(
     "emps", "A linear axis with friction: what its model lacks", "Parameters of the axis",
-    "The training record is written as a user would: a component that its bench moves (the encoder's position) while "
-    "its force is measured. The file knows the mass to 20 % and viscous friction to 50 %.",
+    "The training record is written as a user would write it: a component that its bench moves (the encoder's "
+    "position) while its force is measured. The file knows the mass to 20 % and viscous friction to 50 %.",
     data_sets.rig_from_folder("the EMPS record", _DOWNLOAD, run),
     (Item("EMPS friction", Word.AGREES, "diagnose names Coulomb friction, which halves the error of the force."),
      Item("EMPS parameters", Word.AGREES, "Mass, viscous and Coulomb friction within 1 %.")),

@@ -86,8 +86,8 @@ def _verdict(found: data_sets.Improved, linear: list[float], better: list[float]
 _DOWNLOAD = "download SilverboxFiles.zip from nonlinearbenchmark.org and unpack it; SNLS80mV is read"
 STUDY = Study(
     "silverbox", "A mass on a hardening spring: what its model lacks, and how well it then predicts",
-    "Errors of the benchmark's tests", "The record is written as a user would: run folders with the force and the "
-    "displacement. The file of a single mass knows mass and spring to 20 % and the damper to 50 %. "
+    "Errors of the benchmark's tests", "The record is written as a user would write it: run folders with the force "
+    "and the displacement. The file of a single mass knows mass and spring to 20 % and the damper to 50 %. "
     f"The lab sees the first {FITTED} samples of the part for fitting, and nothing of the tests. The "
     f"first {_SKIP} samples of each test are left out, as published.",
     data_sets.rig_from_folder("the Silverbox", _DOWNLOAD, run),

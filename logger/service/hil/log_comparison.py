@@ -124,7 +124,8 @@ _COMFORT = (("a_w", "a_w", "m/s2", "mps2"), ("MTVV", "mtvv", "m/s2", "mps2"), ("
 
 TOLERANCES = (
     RowTolerance("start", "s", 0.03, "three steps of the sample grid", _of("t_us", per=US_PER_S)),
-    RowTolerance("UTC", "s", 0.1, "what adapters may delay the first bytes of a fix by", _of("utc_us", per=US_PER_S)),
+    RowTolerance("UTC", "s", 0.1, "adapters may delay the first bytes of a fix by this much",
+                 _of("utc_us", per=US_PER_S)),
     RowTolerance("duration", "s", 0.05, "a start and an end", _of("duration_s")),
     RowTolerance("distance", "m", 0.75, "where a drive is cut by time, 0.03 s at 25 m/s", _of("distance_start_m")),
     RowTolerance("length", "m", 0.75, "as the distance",

@@ -275,7 +275,7 @@ class _Export:
                 self._settle()
         reason = f"no room on the stick: {-(-short // 1000)} kB more are needed"
         self._failures += [Failure(name, reason) for name in missing[len(fitting):]]
-        reason = f"the stick holds {manifest.MAX_FILES} files of this logger, the most: take some off it"
+        reason = f"the stick holds {manifest.MAX_FILES} files of this logger, the maximum: remove some"
         self._failures += [Failure(name, reason) for name in too_many]
         if (fault := self._settle()) is not None:
             self._give_up_unlisted(f"the manifest on the stick: {fault}")

@@ -417,9 +417,9 @@ def _has_decimal_commas(table: CsvTable, body: bytes, columns: Sequence[int]) ->
                     return False  # no number at all, which is named when the line is read
             doubtful = doubtful or (number, cell)
     if doubtful is not None and _THOUSANDS.fullmatch(doubtful[1]):
-        raise BadInput(f"{table.file}:{doubtful[0]}: expected numbers whose decimal sign is plain to see, found "
-                       f"{shown(doubtful[1])}, in which the comma may be decimal or part a thousand: write numbers "
-                       "with a decimal point, and nothing between thousands")
+        raise BadInput(f"{table.file}:{doubtful[0]}: expected numbers with a clear decimal sign, found "
+                       f"{shown(doubtful[1])}, where the comma may be a decimal sign or a thousands separator: write "
+                       "numbers with a decimal point and no thousands separators")
     return False
 
 

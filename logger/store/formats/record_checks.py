@@ -255,8 +255,8 @@ def unit_doubts(samples: Array, file: str, moving: Bools | None) -> list[Doubt]:
     mean, rms = counted.mean(axis=0), float(counted[:, 0].std())
     for gravity in (abs(float(mean[0])), float(np.hypot.reduce(mean))):
         if abs(gravity - gravity_g) < gravity_near and rms < gravity_calm:
-            raise BadInput(f"{file}: expected accelerations in m/s2, found a mean of {gravity:.3f}, as gravity in g "
-                           "has it: --unit g takes them as g, --unit mps2 as they are")
+            raise BadInput(f"{file}: expected accelerations in m/s2, found a mean of {gravity:.3f}, as of gravity "
+                           "in g: --unit g takes them as g, --unit mps2 as they are")
     if np.ptp(counted[:, 0]) == 0.0 or (moving is not None and not moving.any()):
         return []
     numbers = {"rms_mps2": rms}
@@ -324,7 +324,8 @@ def read_channels(path: Path | str, only: Sequence[str] = ()) -> ChannelRecord:
     file = str(path)
     wished = ",".join(only) if only else "CHANNEL[,CHANNEL...]"
     if no_sensors := [name for name in only if name in NOT_SENSORS]:
-        raise BadInput(f"{file}:1: expected columns of sensors, found {no_sensors[0]}, which says how the car went")
+        raise BadInput(f"{file}:1: expected columns of sensors, found {no_sensors[0]}, which describes how the car "
+                        "moved")
 
     def choose(names: tuple[str, ...]) -> tuple[str, ...] | None:
         wanted = tuple(only) or tuple(name for name in names if name not in (TIME, *NOT_SENSORS))

@@ -313,7 +313,7 @@ def _read(path: Path | str) -> tuple[Vehicle, Mapping[str, Node], dict[str, Know
         "sensor", "effects", "standard_errors", "correlations", "given", "history"))
     name = keys["name"].text()
     if word(name) != name:
-        raise keys["name"].wrong(f"a name of at most {LONGEST_WORD} characters that can be seen")
+        raise keys["name"].wrong(f"a name of at most {LONGEST_WORD} printable characters")
     if model in OWN_NAMES:
         bench = Vehicle(name, model, 0.0, None, Axle(0.0, 0.0, 0.0, 0.0, 0.0), None, 0.0)
         own = [key for key in OWN_NAMES[model] if key in keys]
