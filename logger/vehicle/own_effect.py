@@ -146,7 +146,7 @@ def _numbers(name: str, found: npt.ArrayLike, like: npt.NDArray[Any]) -> npt.NDA
     """An answer as numbers of the kind and shape of ``like``."""
     numbers = np.asarray(found)
     if numbers.shape != like.shape:
-        raise ValueError(f"expected {name} to return an array of shape {like.shape}, as it was asked, found one "
+        raise ValueError(f"expected {name} to return an array of shape {like.shape}, like its input, found one "
                          f"of shape {numbers.shape}")
     if not np.can_cast(numbers.dtype, like.dtype, "same_kind"):
         raise ValueError(f"expected {name} to return {like.dtype} numbers, found {numbers.dtype}")

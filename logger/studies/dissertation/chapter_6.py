@@ -427,7 +427,7 @@ def _f6_6(effort: Workload) -> Result:
         *(one for item, slopes in (("Fig 6.7", two), ("Fig 6.8", heavy)) for one in about(item, [
             Statement("smallest change of IRI per r.m.s. [%]", "less acceleration regardless of roughness or speed",
                       100 * float(np.min(slopes / own - 1)), 1.0)])),
-        *about("Fig 6.8", [Statement("smallest change over that of two people", "an exaggerated case",
+        *about("Fig 6.8", [Statement("change with twice the mass over that with two people", "an exaggerated case",
                                      float(np.min((heavy / own - 1) / (two / own - 1))), 2.0)])))
 
 
@@ -511,7 +511,7 @@ def _f6_9(effort: Workload) -> Result:
                        level=(0.0, "exact")),
                 "the IRI by the relation, higher at 10 mph than at 70"),
         *(Picture(_compared(f"{figures}: windows of {window_m:.2f} m at {windowed_mph} mph", one),
-                  "the exact IRI and the approximated one along the road, and one against the other")
+                  "two plots of the exact and the approximated IRI: along the road, and one against the other")
           for figures, window_m, one in zip(("Fig 6.12, 6.13", "Fig 6.14, 6.15"), windows_m, cut, strict=True)))
     return Result((table, windows), verdict, pictures, (
         *about("Fig 6.11", [
