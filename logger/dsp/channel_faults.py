@@ -34,15 +34,15 @@ def at_ends(samples: Array) -> Bools:
 
 def longest_still(samples: Array, rate_hz: float) -> tuple[int, int] | None:
     """Where samples (n,) stand still, longer than in all other places together, come to in a leap; None where they do
-    not for a tenth of a second. A part that slides, or has play, holds its force again and again."""
+    not for a tenth of a second. A part that slides, or has play, holds its force again and again, mostly for less."""
     same = np.diff(samples) == 0
     found = [(int(first), int(last) + 1) for first, last in zip(*stretches_of(same), strict=True)
-             if last + 1 - first >= max(_EQUAL, _STILL_S * rate_hz)]
+             if last + 1 - first >= _EQUAL]
     usual = float(np.sqrt(np.mean(np.diff(samples) ** 2)))
     moves = usual > _LEAP_STEPS * _step(samples)
     longest = max(found, key=lambda one: one[1] - one[0], default=(0, 0))
     is_alone = 2 * (longest[1] - longest[0]) > sum(last - first for first, last in found)
-    return longest if is_alone and moves else None
+    return longest if is_alone and moves and longest[1] - longest[0] >= _STILL_S * rate_hz else None
 
 
 def goes_against(force_n: Array, motion: Array, measured: int, orders: range, rate_hz: float) -> bool:

@@ -29,6 +29,11 @@ def test_a_cable_that_is_out_is_found_and_what_rests_is_not() -> None:
     assert longest_still(0.2 * np.round(np.exp(-TIME_S) * SWING / 0.2), RATE_HZ) is None
     play = 0.1 * np.round(30.0 * np.sign(SWING) * np.maximum(np.abs(SWING) - 0.4, 0.0))  # read in steps
     assert longest_still(play, RATE_HZ) is None
+    often = noisy.copy()
+    for first in range(500, 3500, 300):
+        often[first : first + 15] = 0.0  # less than a tenth of a second, and once more
+    often[2000:2022] = 0.0
+    assert longest_still(often, RATE_HZ) is None
 
 
 @pytest.mark.parametrize("measured", [0, 1, 2])
