@@ -288,7 +288,7 @@ class _Pasco(SerialAccelerometer[PascoConfig]):
         if is_given:
             return settings
         if said.flag("calibrated"):
-            raise SettingsError("recorded with a calibration of its own; expected its settings, --config FILE")
+            raise SettingsError("recorded with its own calibration; expected the settings of that drive, --config FILE")
         return replace(settings, profile=said.name("profile", settings.profile, shipped_profiles(),
                                                    "the settings of the recording, --config FILE, or "))
 

@@ -57,7 +57,7 @@ class MeasuredLine:
             raise ValueError(f"expected positions no farther apart than their distances, found {apart_m[at]:.0f} m "
                              f"between those at {distance_m[at]:g} and {distance_m[at + 1]:g} m")
         if apart_m.sum() < _LESS * ahead_m.sum() - _PLACE_M:
-            raise ValueError(f"expected positions {ahead_m.sum():.0f} m apart in all, as the distances are, found "
+            raise ValueError(f"expected positions {ahead_m.sum():.0f} m apart in all, to match the distances, found "
                              f"{apart_m.sum():.0f} m")
         return MeasuredLine(distance_m, east_m, north_m, float(lat_deg[0]), float(lon_deg[0]))
 

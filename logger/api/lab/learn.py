@@ -260,7 +260,8 @@ def source_of(found: Learning, addition: AddedEffects | None) -> str:
     count = len(found.context.runs)
     head = [f"{said[0].upper()}{said[1:]}.",
             f"Learned by ridelog from {count} run{'s' * (count != 1)}, {seconds:.0f} s. {_errors(addition)}",
-            "Its parameters begin where that fit ended; ridelog add-effect with this file fits them and the car anew."]
+            "Its parameters start at that fit's values; ridelog add-effect with this file refits them together with "
+            "the car."]
     return law.draft.text(law_learned(law, addition).values, head)
 
 

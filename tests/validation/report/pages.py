@@ -81,7 +81,7 @@ def parts(records: Sequence[Record]) -> list[Part]:
     return [
         Part("Goals", [], _goals(records)),
         Part("By strength", [
-            "Strength is the r.m.s. of what the effect changes in the noise-free record over the r.m.s. of the noise, "
+            "Strength is how much the effect changes the noise-free record (r.m.s.), relative to the noise (r.m.s.), "
             "with all other parameters true; of several effects, that of the weakest. *Can be seen* excludes the "
             "cases under *What nobody could see*."], _by_strength(records)),
         Part("After adding", _adding(records)),
