@@ -626,7 +626,7 @@ def _motion(question: SimulateQuestion, car: Car, track: Track | Excitation) -> 
 def _run(question: SimulateQuestion, columns: Mapping[str, Array], track: Track | Excitation) -> Run:
     time_s, accel, speed_mps, distance_m = (columns[name] for name in (drive_file.TIME, *drive_file.COLUMNS[1:]))
     profile, excitation = ((None, track.begun(float(time_s[0]))) if isinstance(track, Excitation) else
-                           (_profile_of(track), None))
+                           (profile_of(track), None))
     more = {name: one for name, one in columns.items() if name not in (drive_file.TIME, *drive_file.COLUMNS)}
     return Run(Path(question.name), question.rate_hz, time_s, accel, speed_mps, distance_m, None, None, profile,
                excitation, more=more)
@@ -647,7 +647,8 @@ def _knots(time_s: npt.ArrayLike, speed_mps: npt.ArrayLike, name: str) -> tuple[
     return times, speeds
 
 
-def _profile_of(track: Track) -> Profile:
+def profile_of(track: Track) -> Profile:
+    """A road as the profile that a person reads."""
     tracks = track.elevation_m.reshape(len(track.elevation_m), -1).T
     return Profile(track.start_m, track.spacing_m, tracks[0], tracks[1] if len(tracks) > 1 else None)
 

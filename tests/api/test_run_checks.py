@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from logger.api.drives import Run, profile_of
 from logger.api.lab.checks import driven_stretches, thinned_runs, unexplained_up_to_hz
 from logger.errors import BadInput
 from logger.runs import CLIPPED, NO_READING, READING, SKIP_S
-from logger.store.formats.drive_file import DriveOnRoad
 
 from ..support.lab.runs_with_residual import a_run
 
 
 def drive(marks: dict[tuple[float, float], float], lasts_s: float = 30.0, stands_s: tuple[float, float] = (0, 0)
-          ) -> DriveOnRoad:
+          ) -> Run:
     """A drive with marks from a second to another."""
     run = a_run("run", 10.0, lasts_s, 1)
     usable = np.full(run.count, READING)
@@ -26,8 +26,8 @@ def drive(marks: dict[tuple[float, float], float], lasts_s: float = 30.0, stands
     speed = run.speed_mps.copy()
     speed[round(100 * stands_s[0]) : round(100 * stands_s[1])] = 0.0
     accel = np.random.default_rng(1).normal(0, 1, run.count)
-    return DriveOnRoad(Path("run"), 100.0, run.time_s, accel, speed, run.distance_m, None, None, usable=usable,
-                       track=run.track)
+    return Run(Path("run"), 100.0, run.time_s, accel, speed, run.distance_m, None, None, usable=usable,
+               profile=profile_of(run.track))
 
 
 def test_a_loose_wire_leaves_one_run() -> None:

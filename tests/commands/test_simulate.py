@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from logger.api.drives import Run
 from logger.api.drives import run_on_road as read_run
 from logger.commands.main import main
 from logger.errors import BadInput
@@ -17,7 +18,7 @@ from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.roads.obstacles import speed_bump
 from logger.shipped import vehicle_file
-from logger.store.formats.drive_file import DriveOnRoad, write_profile
+from logger.store.formats.drive_file import write_profile
 from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.compose import compose, recorded, respond
@@ -39,7 +40,7 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def simulated(folder: Path, *arguments: str, vehicle: str = "rav4-2009") -> DriveOnRoad:
+def simulated(folder: Path, *arguments: str, vehicle: str = "rav4-2009") -> Run:
     assert main(["simulate", "--vehicle", vehicle, "--profile", str(folder / "profile.csv"),
                  "--out", str(folder / "drive.csv"), *arguments]) == 0
     return read_run(folder)

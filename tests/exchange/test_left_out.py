@@ -9,12 +9,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from logger.api.drives import Run, profile_of
 from logger.api.lab.checks import driven_stretches
 from logger.commands.main import main
 from logger.left_out import LeftOut, counting, left_out_json, left_out_lines
 from logger.profiles.track import Track
 from logger.runs import runs_left_out
-from logger.store.formats.drive_file import DriveOnRoad
 
 from .test_convert import drive, eastwards, write
 
@@ -61,8 +61,8 @@ def test_of_a_drive_the_lab_counts_standing_beginnings_and_holes() -> None:
     speed[1500:2000] = 0.0  # 5 s of standing
     usable[3000:3100] = 0.0  # 1 s in which nothing was read
     usable[3500:] = 0.0  # and 5 s at the end
-    one = DriveOnRoad(Path("a"), 100.0, np.arange(count) / 100, np.sin(np.arange(count)), speed,
-                      np.cumsum(speed) / 100, None, None, usable=usable, track=Track(1.0, np.zeros(500)))
+    one = Run(Path("a"), 100.0, np.arange(count) / 100, np.sin(np.arange(count)), speed,
+              np.cumsum(speed) / 100, None, None, usable=usable, profile=profile_of(Track(1.0, np.zeros(500))))
     found = {one.why: one.amount for one in runs_left_out(driven_stretches(one))}
     assert found == {
         "without excitation or readings": pytest.approx(10.0, abs=0.1),

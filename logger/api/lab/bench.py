@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from copy import copy
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -36,7 +36,7 @@ from logger.question import TOLERANCE, UNKNOWN, Notify, WrongOption, silent
 from logger.runs import Run, are_on_rig
 from logger.shipped import vehicle_path
 from logger.simulation.virtual_drive import SEARCH_HZ, SimulatedRuns
-from logger.store.formats import drive_file, effect_file
+from logger.store.formats import effect_file
 from logger.store.formats.effect_file import check_on, effect_named, own_effect
 from logger.store.formats.vehicle_file import CarModel, ModelStep
 from logger.vehicle.compose import compose
@@ -411,7 +411,7 @@ def bench_with(question: LabQuestion, searches: str | None = None, thin: bool = 
                     off, searches, question.warn, question.low_pass_hz, question.anyway)
 
 
-def lab_drives(runs: Runs, notify: Notify = silent) -> list[drive_file.DriveOnRoad]:
+def lab_drives(runs: Runs, notify: Notify = silent) -> list[DrivenRun]:
     """One run or several, read, with their roads. BadInput for none, for two that are one, or of one name, and for one
     without a road."""
     given = each(runs)
@@ -422,9 +422,7 @@ def lab_drives(runs: Runs, notify: Notify = silent) -> list[drive_file.DriveOnRo
         raise BadInput(
             f"{again.path if isinstance(again, DrivenRun) else again}: expected each run once, with a name of "
                        "its own")
-    return [drive_file.DriveOnRoad(**{one.name: getattr(run, one.name) for one in fields(drive_file.Drive)},
-                                   track=run.track) for run in [run_on_road(one, notify) for one in given]
-            if run.track is not None]
+    return [run_on_road(one, notify) for one in given]
 
 
 def word_of(vehicle: CarModel | Path | str, model: CarModel) -> str:

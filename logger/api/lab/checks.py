@@ -58,7 +58,7 @@ from logger.runs import (
     zero_is_known,
 )
 from logger.simulation.virtual_drive import SimulatedRuns, steps_hz
-from logger.store.formats.drive_file import DRIVE, RUN, Drive, DriveOnRoad
+from logger.store.formats.drive_file import DRIVE, RUN, Drive
 from logger.store.formats.vehicle_file import CarModel
 from logger.units import FOOT_M, LBF_N, STANDARD_GRAVITY_MPS2
 from logger.vehicle.compose import Car, bounded, compose
@@ -343,7 +343,7 @@ _BACK_M = 1.0  # a distance that was set right may fall, or leap, so far
 _DISAGREE, _DISAGREE_M = 0.5, 5.0
 
 
-def checked_runs(drives: Sequence[DriveOnRoad], thin: bool = True, vehicle: Vehicle | None = None) -> SimulatedRuns:
+def checked_runs(drives: Sequence[Drive], thin: bool = True, vehicle: Vehicle | None = None) -> SimulatedRuns:
     """Runs of one sample rate; of about 100 samples a second, or as many as the ``vehicle`` needs, if they have many
     more and may be thinned (``thin``).
 
@@ -351,6 +351,7 @@ def checked_runs(drives: Sequence[DriveOnRoad], thin: bool = True, vehicle: Vehi
     """
     for number, drive in enumerate(drives):
         file = drive.path / DRIVE if drive.path.is_dir() else drive.path
+        assert drive.track is not None
         if isinstance(drive.track, Track):
             first_m, last_m = float(drive.distance_m.min()), float(drive.distance_m.max())
             if last_m < drive.track.start_m or first_m > drive.track.end_m:
@@ -420,10 +421,11 @@ def check_distances(drive: Drive, file: Path) -> None:
                        f"the speed and {way_m:.4g} m from the distance ({likely_unit(by_speed_m, way_m)})")
 
 
-def driven_stretches(drive: DriveOnRoad) -> list[Run]:
+def driven_stretches(drive: Drive) -> list[Run]:
     """The parts of a drive in which the car moved, or it is known what drove the rig, and there were readings
     (``driven_parts``), each a run. A part says in its name which seconds it is of. BadInput as ``driven_parts``."""
     driven = None
+    assert drive.track is not None
     if isinstance(drive.track, Excitation):
         near_s, time_s = 0.5 / drive.rate_hz, drive.time_s - drive.time_s[0]
         driven = (time_s > drive.track.start_s - near_s) & (time_s < drive.track.end_s + near_s)
@@ -447,17 +449,16 @@ def driven_stretches(drive: DriveOnRoad) -> list[Run]:
 def least_s(drive: Drive, vehicle: Vehicle | None = None) -> float:
     """How long a drive, or a test of a part, has to be; of a rig that nothing drives three periods of the vehicle's
     slowest vibration, or what there is where that is not known [s]."""
-    track = getattr(drive, "track", None)
-    if past_of(track) is Past.FREE:
+    if past_of(drive.track) is Past.FREE:
         slowest_hz = 0.0 if vehicle is None else float(undamped_frequencies_hz(structure_of(vehicle))[0])
         return min(_LEAST_PERIODS / slowest_hz, LEAST_S) if slowest_hz else 0.0
-    return _LEAST_OF_PART_S if past_of(track) is Past.OF_PART else LEAST_S
+    return _LEAST_OF_PART_S if past_of(drive.track) is Past.OF_PART else LEAST_S
 
 
 def check_decay(drive: Drive, file: Path) -> None:
     """Raise BadInput for a record that does not die down, of a run that nothing drives: what little damps does so from
     swing to swing, though its second half is hardly less than the first."""
-    if past_of(getattr(drive, "track", None)) is Past.FREE:
+    if past_of(drive.track) is Past.FREE:
         half = len(drive.accel_z_mps2) // 2
         first, last = (float(part.std()) for part in (drive.accel_z_mps2[:half], drive.accel_z_mps2[half:]))
         if last > _DIES_DOWN * first and not _swings_shrink(drive.accel_z_mps2):
@@ -484,7 +485,7 @@ _ORDERS = {"displacement": 0, "travel": 0, "velocity": 1, "acceleration": 2}
 def check_channels(drive: Drive, file: Path, vehicle: Vehicle) -> None:
     """Raise BadInput for a channel of a rig that was at its end or out for a time, which no column ``usable`` says, and
     for a force of the wrong sign."""
-    track, main = getattr(drive, "track", None), drive.facts.main
+    track, main = drive.track, drive.facts.main
     if not isinstance(track, Excitation):
         return
     read = [(main, drive.accel_z_mps2), *((one, drive.more[one.name]) for one in drive.facts.signals)]
@@ -610,8 +611,7 @@ def _needed_hz(vehicle: Vehicle | None) -> float:
 def _least_hz(drive: Drive, vehicle: Vehicle | None) -> tuple[float, str]:
     """The fewest samples a second that show what the lab looks at, and what that is: on a rig the vehicle's slowest
     vibration, and on a road the wheels' hop."""
-    track = getattr(drive, "track", None)
-    if vehicle is None or track is None or not track.timed:
+    if vehicle is None or drive.track is None or not drive.track.timed:
         return _LEAST_RATE_HZ, "the wheels hop"
     slowest_hz = float(undamped_frequencies_hz(structure_of(vehicle))[0])
     return slowest_hz / HIGHEST_OF_RATE, f"its vibration at {slowest_hz:.3g} Hz"
@@ -628,7 +628,7 @@ def check_rate(drive: Drive, file: Path, vehicle: Vehicle | None) -> None:
 def check_record(drive: Drive, file: Path, others: Sequence[Drive], vehicle: Vehicle | None = None) -> None:
     """Raise BadInput for a drive of fewer samples a second than what is looked at needs, that is too short, has
     another rate than the others, recorded nothing, or repeats samples."""
-    track = getattr(drive, "track", None)
+    track = drive.track
     past_s, shortest_s = past_of(track).value, least_s(drive, vehicle)
     check_rate(drive, file, vehicle)
     lasts_s = len(drive.time_s) / drive.rate_hz

@@ -248,16 +248,14 @@ class Drive:
     facts: RecordFacts = field(default=UNKNOWN, kw_only=True)
     more: Mapping[str, Array] = field(default_factory=dict, kw_only=True)
 
+    @property
+    def track(self) -> Track | Excitation | None:
+        """The road, or the excitation of a rig; None: not known."""
+        return None
+
     def marks(self, part: slice = slice(None)) -> Array | None:
         """``usable`` of a part; None where all of it are readings."""
         return None if self.usable is None or (self.usable[part] == READING).all() else self.usable[part]
-
-
-@dataclass(frozen=True, eq=False)
-class DriveOnRoad(Drive):
-    """A drive over a known road, ``track``, or on a rig that is driven by time."""
-
-    track: Track | Excitation
 
 
 def drive_in(folder: Path, timed: bool) -> Drive:
