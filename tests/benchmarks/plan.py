@@ -18,7 +18,6 @@ from logger.lab.diagnosis import diagnose
 from logger.lab.likelihood.distance_error import USUAL
 from logger.question import USUAL_TOLERANCE
 from logger.store.formats.effect_file import shipped_effects
-from logger.vehicle.effect import chosen
 from logger.vehicle.named_parameters import free_parameters_of
 
 from ..validation.simulator.cars import Axle, Car
@@ -99,7 +98,7 @@ def deviations(name: str, runs: list[ridelog.Run]) -> float:
     bench = bench_with(CompareQuestion(VEHICLE, runs, tolerance=USUAL_TOLERANCE))
     posterior = bench.posterior(searches=True)
     one = diagnose(posterior, among(bench.effects, [name])).candidate(name)
-    gain = one.gain + len(free_parameters_of([chosen(one.effect, one.values)])) * float(np.log(posterior.freedom))
+    gain = one.gain + len(free_parameters_of([one.one])) * float(np.log(posterior.freedom))
     return float(np.sqrt(max(gain, 0.0)))
 
 

@@ -152,7 +152,7 @@ def test_a_law_is_offered_where_no_effect_explains_it(tmp_path: Path, capsys: py
     runs = write_runs(tmp_path / "runs", [chosen(Square(), {})], lasts_s=16.0)
     asked = answering("maybe", "no", *["no"] * 4)
     assert lab(runs, tmp_path / "not") == 0
-    assert "Learn a law out of the data" in asked[0] and "Expected yes or no." in capsys.readouterr().out
+    assert "Learn a law from the data" in asked[0] and "Expected yes or no." in capsys.readouterr().out
     assert not (tmp_path / "not" / "law.py").exists()
     out = tmp_path / "out"
     assert lab(runs, out, "--json") == 0
