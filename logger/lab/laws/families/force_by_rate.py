@@ -47,8 +47,10 @@ class ForceByRate(CurveFamily):
                         title=f"{plain.title}, behind a spring")]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
-        behind = f", behind a spring of {say('spring_n_per_m', 0.001, 'N/mm')}" * (draft.variant == _BEHIND)
-        return super().words(draft, found, say) + behind
+        plain = super().words(draft, found, say)
+        if draft.variant != _BEHIND:
+            return plain
+        return f"{plain}, behind a spring of {say('spring_n_per_m', 0.001, 'N/mm')}"
 
 
 FAMILY = ForceByRate()
