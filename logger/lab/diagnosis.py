@@ -49,7 +49,7 @@ from logger.lab.selection.stepwise import MeasuredRoad, Search, SearchEffort, Se
 from logger.runs import BY_ROAD, Past, are_on_rig
 from logger.simulation.virtual_drive import steps_hz
 from logger.vehicle import named_parameters
-from logger.vehicle.effect import Chosen, Effect, ForceEffect, SensorEffect
+from logger.vehicle.effect import Chosen, Effect, SensorEffect
 from logger.vehicle.named_parameters import free_parameters_of
 
 Progress = Callable[[str], None]
@@ -256,26 +256,10 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
 
 
 def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
-                   progress: Progress = lambda words: None, effort: SearchEffort | None = None
-                   ) -> tuple[Search, Selection]:
-    """The search of a diagnosis and its result; arguments as of ``diagnose``.
-
-    Of a part on its bench the forces are sought first. What changes any force, as a sensor or the mass of a fixture
-    does, imitates some of any memory. Where forces leave something, it is sought on top, and found where nothing
-    is left with it. Where they leave nothing, all are sought together as well, and the likelier end is taken: a mount
-    that gives imitates a delay. The first round is that of all effects in any case."""
-    search, before = begin_search(posterior, effects, present, progress, effort)
-    forces = [one for one in search.effects if isinstance(one, ForceEffect)]
-    if posterior.vehicle.model != "component" or not forces:
-        return search, search.run(before)
-    by_forces = replace(search, effects=forces, _promising=set(), _rivals={})
-    selection = by_forces.run(before)
-    if not exceeds_noise(selection.now):
-        together = search.run(before)
-        is_likelier = selection.now.score < together.now.score - INDISTINGUISHABLE
-        return search, replace(selection, first=together.first) if is_likelier else together
-    wider, more = by_forces.with_more(selection, [one for one in search.effects if one not in forces])
-    return wider, replace(selection, first=more.first) if exceeds_noise(more.now) else more
+                   progress: Progress = lambda words: None) -> tuple[Search, Selection]:
+    """The search of a diagnosis and its result; arguments as of ``diagnose``."""
+    search, before = begin_search(posterior, effects, present, progress)
+    return search, search.run(before)
 
 
 def exceeds_noise(model: Baseline) -> bool:
@@ -285,8 +269,7 @@ def exceeds_noise(model: Baseline) -> bool:
 
 
 def begin_search(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
-                 progress: Progress = lambda words: None, effort: SearchEffort | None = None
-                 ) -> tuple[Search, Baseline]:
+                 progress: Progress = lambda words: None) -> tuple[Search, Baseline]:
     """The search and the fitted model that it begins at; arguments as of ``diagnose``."""
     obstacles = obstacles_of(posterior, effects, present)
     tried = [one for name, one in effects.items() if name not in obstacles]
@@ -296,7 +279,7 @@ def begin_search(posterior: Posterior, effects: Mapping[str, Effect], present: S
     before = refit(posterior, nominal) if unknown is None else unknown.fitted(posterior, present)
     search: Search[Baseline, Screened, CandidateFit] = Search(
         tried, len(present), misalignment(posterior, nominal), progress,
-        effort=effort or (SearchEffort() if unknown is None else SearchEffort(fitted=3)),
+        effort=SearchEffort() if unknown is None else SearchEffort(fitted=3),
         likelihood=unknown or MeasuredRoad())
     return search, before
 
@@ -431,21 +414,8 @@ def _fit_finely(search: Search, selection: Selection) -> tuple[Selection, Linear
                    for one in errors.effects[search.present:]}
             weakest = min(far, key=far.__getitem__, default=None)
             if weakest is None or far[weakest] > UNUSUAL_SIGMA:
-                weakest = _of_a_sensor(search, selection, after)
-            if weakest is None:
                 return selection, after
             selection = search.without_effect(selection, weakest)
-
-
-def _of_a_sensor(search: Search, selection: Selection, after: LinearModel) -> str | None:
-    """Where something unknown is left, an effect of the sensor that explains less than half of what there is without
-    it: whatever filters or shifts a record imitates a part of any motion. None: there is no such effect."""
-    named = [one.effect.name for one in selection.now.effects
-             if one.effect.name in selection.gains and isinstance(one.effect, SensorEffect)]
-    if not named or excess_over_noise(after.posterior, after.state, FALSE_ALARM) <= UNEXPLAINED:
-        return None
-    return next((name for name in named if not search.likelihood.explains_most(
-        search.without(selection.now, name), selection.now)), None)
 
 
 def _steps(selection: Selection, nominal_error: float) -> tuple[ErrorStep, ...]:

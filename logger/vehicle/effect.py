@@ -189,6 +189,8 @@ class Effect(ABC):
     shown_by     the drive that would show it best, as an instruction
     realigns     whether it moves the model against the measurement, so that a search looks at how they lie first
     reshapes     whether it does more than that
+    imitates_any whether it changes all of a record, and so imitates a part of any force: it is evident only where it
+                 explains most of what is left, or leaves nothing
     replaces     those of its parameters that are numbers of the car, which it sets, whatever they are
     sought       whether a search tries it where nobody asked for it by name
     sought_last  whether it does so anywhere else, too, where all others leave something unexplained
@@ -216,6 +218,7 @@ class Effect(ABC):
     shown_by: str
     realigns: bool = False
     reshapes: bool = True
+    imitates_any: bool = False
     replaces: tuple[str, ...] = ()
     sought: Sought = Sought.ALWAYS
     sought_last: bool = False
@@ -363,6 +366,8 @@ class ForceEffect(Effect):
 class SensorEffect(Effect):
     """Between the body's motion and the record; linear."""
 
+    imitates_any = True
+
     @abstractmethod
     def factor(self, p: Values, s: Complex) -> Complex:
         """What an acceleration exp(s t) is multiplied by, s (...) [1/s]."""
@@ -411,8 +416,8 @@ class Chosen:
     @property
     def at_bound(self) -> bool:
         """Whether nothing of an effect that has a strength was measured, as all its numbers are at ends of their
-        ranges, or it can be no weaker, or a shape is at the end of its range (a frequency, a damping): what looks like
-        it is something else."""
+        ranges, or it can be no weaker, or a shape is at an end of its range at which it is not by default (a frequency,
+        a damping, the rate over which a friction grows): what looks like it is something else."""
         numbers = self.freed
         besides = [one for one in numbers if one.name in self.effect.also_by]
         if (any(one.at_weakest_bound(self.values[one.name]) for one in numbers)
@@ -420,8 +425,9 @@ class Chosen:
             return True
         if any(one.null is not None for one in numbers) and all(one.at_bound(self.values[one.name]) for one in numbers):
             return True
-        shapes = [one for one in numbers if one.null is None and one.scale is Scale.LOG]
-        return len(shapes) < len(numbers) and any(one.at_bound(self.values[one.name]) for one in shapes)
+        shapes = [one for one in numbers if one.null is None]
+        return len(shapes) < len(numbers) and any(
+            one.at_bound(self.values[one.name]) and self.values[one.name] != one.default for one in shapes)
 
     @property
     def is_plain(self) -> bool:

@@ -232,6 +232,9 @@ def test_an_asymmetric_damper_keeps_its_mean_and_a_digressive_one_its_slope_befo
     values = {"knee_velocity_m_per_s": 0.1, "slope_ratio": 0.25}
     digressive = EFFECTS["damper_blow_off"].laws(usual(EFFECTS["damper_blow_off"], **values).p, linear(1000.0))
     assert digressive.damper(np.array([0.05, -0.1, 0.3, -0.3])) == pytest.approx([50, -100, 150, -150])
+    values |= {"rebound_to_bump_knee_ratio": 0.25, "rebound_to_bump_slope_ratio": 4.0}
+    by_direction = EFFECTS["damper_blow_off"].laws(usual(EFFECTS["damper_blow_off"], **values).p, linear(1000.0))
+    assert by_direction.damper(np.array([0.05, -0.2, 0.25, -0.3])) == pytest.approx([50, -200, 150, -212.5])
 
 
 def test_a_shift_of_the_centre_of_gravity_leaves_axles_and_sensor_where_they_are() -> None:

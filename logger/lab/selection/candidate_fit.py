@@ -99,27 +99,30 @@ def refine(score: float, one: CandidateFit, worth: float = 0.0, rounds: int = 3)
     return CandidateFit.of(score, fit(one.found.linearise(), one.found.numbers, rounds, min_gain=worth))
 
 
+def reshaped(found: LinearModel | MapFit, name: str, ways: Iterable[Mapping[str, float]]) -> LinearModel:
+    """The model with other refinements of one of its effects, fitted from where it is, with the likeliest of some ways.
+    NotSimulated where none can be simulated."""
+    state, begun = found.state, []
+    for way in ways:
+        effects = [replace(one, values={**one.values, **{each: way[each] for each in one.effect.refinements}})
+                   if one.effect.name == name else one for one in state.effects]
+        begun.append(LinearModel(found.posterior, found.posterior.state_at(
+            effects, state.logs, state.record, state.size), found.numbers))
+    return fit(min(begun, key=lambda each: each.score), found.numbers)
+
+
 def with_refinements(now: Baseline, name: str) -> Baseline:
     """The model, or one with refinements of one of its effects, which has its plain form, that begins there, if that
     explains most of what the plain one leaves, and of what one that begins where it ended leaves, too."""
-    plain = CandidateFit.of(now.score, now.linear)
     place = [one.effect.name for one in now.effects].index(name)
     effect = now.effects[place].effect
-
-    def fitted(found: MapFit, ways: Iterable[Mapping[str, float]]) -> CandidateFit:
-        state, begun = found.state, []
-        for way in ways:
-            effects = list(state.effects)
-            effects[place] = replace(effects[place], values={
-                **effects[place].values, **{name: way[name] for name in effect.refinements}})
-            begun.append(LinearModel(found.posterior, found.posterior.state_at(
-                effects, state.logs, state.record, state.size), found.numbers))
-        return CandidateFit.of(now.score, fit(min(begun, key=lambda each: each.score), found.numbers))
-
+    plain = CandidateFit.of(now.score, now.linear)
+    ways = [way for way in effect.trials() if not Chosen(effect, way).is_plain]
     try:
-        refined = fitted(plain.found, (way for way in effect.trials() if not Chosen(effect, way).is_plain))
+        refined = CandidateFit.of(now.score, reshaped(plain.found, name, ways))
         if refined.gain > INDISTINGUISHABLE:
-            plain = max(plain, fitted(refined.found, [effect.usual]), key=lambda each: each.gain)
+            again = CandidateFit.of(now.score, reshaped(refined.found, name, [effect.usual]))
+            plain = max(plain, again, key=lambda each: each.gain)
     except NotSimulated:
         return now
     better = refined.gain > plain.gain + INDISTINGUISHABLE and refined.hold_out.explains_most_beyond(plain.hold_out)

@@ -19,9 +19,9 @@ import numpy as np
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit, fit_to_the_end
 from logger.lab.likelihood.noise_floor import is_within_discrepancy
-from logger.lab.likelihood.posterior import Posterior
+from logger.lab.likelihood.posterior import NotSimulated, Posterior
 from logger.lab.residuals.unexplained import is_coloured_noise
-from logger.lab.selection.candidate_fit import CandidateFit, chance_of, fit_roughly, refine, with_refinements
+from logger.lab.selection.candidate_fit import CandidateFit, chance_of, fit_roughly, refine, reshaped, with_refinements
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION, INDISTINGUISHABLE, min_gain
 from logger.lab.selection.holdout import HoldOut
 from logger.lab.selection.screening import (
@@ -148,6 +148,10 @@ class Likelihood(Protocol[M, P, F]):
         """The model, or one with refinements of one of its effects, where they explain most of what it leaves."""
         return now
 
+    def plain(self, now: M, name: str) -> M | None:
+        """The model with one of its effects in its plain form, fitted; None: it cannot be simulated."""
+        return None
+
     def chance(self, one: Chosen, gain: float, base: M, candidates: int) -> float:
         """Probability, at most, that noise alone gains as much over a model with any of so many candidates."""
 
@@ -217,6 +221,14 @@ class MeasuredRoad:
     def refined_beside(self, now: Baseline, name: str) -> Baseline:
         """Begun where the model ended."""
         return with_refinements(now, name)
+
+    def plain(self, now: Baseline, name: str) -> Baseline | None:
+        """Begun where the model ended."""
+        effect = next(one.effect for one in now.effects if one.effect.name == name)
+        try:
+            return Baseline.of(reshaped(now.linear, name, [effect.usual]))
+        except NotSimulated:
+            return None
 
     def chance(self, one: Chosen, gain: float, base: Baseline, candidates: int) -> float:
         """By the evidence and by the likelihood."""
@@ -314,40 +326,45 @@ class Search(Generic[M, P, F]):
         """A search that ended because it had found as many effects as it might, with more of them; ``known``: the round
         on the model that it goes on from."""
         before, now, first, steps = begun.before, begun.now, begun.first, list(begun.steps)
-        last = begun.last
+        last, asked = begun.last, set[str]()
         while len((now := self._refined(now)).effects) - self.present < self.effort.effects:
             untried = [one for one in self.effects if one.name not in names_of(now)]
             if not untried:
                 break
             self.progress(f"round {len(steps) + 1}")
-            last = tried = known or self.round(now, untried)
-            known = None
-            first = first if steps else tried
-            best = self._simplest(now, tried)
+            new = [one.effect.name for one in now.effects[self.present:]
+                   if not (one.is_plain or one.effect.name in asked)]
+            asked.update(new)
+            best, grown, tried = self._before_refinements(now, new, untried)
+            if best is None:
+                last = tried = known or self.round(now, untried)
+                known = None
+                first = first if steps else tried
+                best = self._simplest(now, tried)
             if best is None and not steps and (under := self._underlaid(now, tried)) is not None:
                 tried = self.round(under, [one for one in untried if one.name not in names_of(under)])
                 if (best := self._simplest(under, tried)) is not None:
                     now = under
                     steps.append((names_of(now)[-1], now.hold_out))
-            grown = None
-            if best is None and (together := self._with_refinements(now, tried)) is not None:
-                best, grown = together
+            if best is None and any(one.effect.refinements for one in now.effects[self.present:]):
+                best, grown = self._with_refinements(now, now, tried)
             if best is None:
-                other = self._reconsidered(now, tried)
+                other = self._reconsidered(before, now, tried)
                 if other is now:
                     break
                 now = other
                 continue
             self.progress(f"{best.effect.name} is missing; fitting the model with it")
             self._rivals[best.effect.name] = self._rivals_of(now, best.gain, best.effect.name, tried)
-            now = self._reconsider(grown or self.likelihood.with_effect(best), best.effect.name, now)
+            now = self._in_range(self._reconsider(
+                before, grown or self.likelihood.with_effect(best), best.effect.name, now))
             *earlier, added = names_of(now)[self.present:]
             last = UNTRIED
             if not earlier and (refitted := self.without(now, added)).score < before.score - INDISTINGUISHABLE:
                 return self.run(refitted)  # the effect led the fit of the car's own numbers out of a wrong minimum
             steps.append((added, now.hold_out))
             for name in earlier:
-                now = self._reconsider(now, name)
+                now = self._reconsider(before, now, name)
         now, gains = self.eliminate_backward(before, now)
         rivals = {name: tuple(one for one in self._rivals.get(name, ()) if one not in gains) for name in gains}
         self._reduced = None
@@ -364,39 +381,62 @@ class Search(Generic[M, P, F]):
         if now is before or (best is not None and best.effect in more):
             return wider, wider.go_on(Selection(before, before, {}, {}, first, ()), first)
         for name in names_of(now)[self.present:] if wider._promising else ():
-            now = wider._reconsider(now, name)
+            now = wider._reconsider(before, now, name)
         wider._promising |= self._promising
         known = wider.round(now, more, beside=begun.last) if begun.last.on is now else None
         return wider, wider.go_on(replace(begun, now=now, first=first), known)
 
-    def _refinable(self, now: M) -> list[str]:
-        """Names of the effects that were found, in their plain form, and have another."""
-        return [one.effect.name for one in now.effects[self.present:] if one.effect.refinements and one.is_plain]
-
     def _refined(self, now: M) -> M:
-        """The model with refinements of the effects that were found, each where it explains most of what is left. They
-        are judged before a further effect is sought, which may only imitate one."""
-        for name in self._refinable(now) if now.explanation else ():
-            now = self.likelihood.refined_beside(now, name)
+        """The model with refinements of the effects that were found, each where it explains most of what is left."""
+        for one in now.effects[self.present:] if now.explanation else ():
+            if one.effect.refinements and one.is_plain:
+                now = self.likelihood.refined_beside(now, one.effect.name)
         return now
 
-    def _with_refinements(self, now: M, tried: SearchRound[P, F]) -> tuple[F, M] | None:
-        """The best of the effects that gain so little that they may imitate something, and the model with it, where
-        that and refinements of those before it together explain most of what is left; None: they do not."""
-        best = next((one for one in tried.fits if self.may_imitate(now, one)), None)
-        if best is None or not self._refinable(now):
-            return None
-        grown = self._refined(self.likelihood.with_effect(best))
-        return (best, grown) if self.likelihood.explains_most(now, grown) else None
+    def _in_range(self, now: M) -> M:
+        """The model with those effects in their plain form whose refinements an effect more has led too far."""
+        for one in now.effects[self.present:]:
+            if one.is_refined_too_far:
+                now = self.likelihood.plain(now, one.effect.name) or now
+        return now
 
-    def _reconsidered(self, now: M, tried: SearchRound[P, F]) -> M:
+    def _before_refinements(self, now: M, names: Sequence[str], untried: Sequence[Effect]
+                            ) -> tuple[F | None, M | None, SearchRound[P, F]]:
+        """As ``_with_refinements``, with the plain form of one of some effects, where the model leaves more than noise;
+        and the round on that."""
+        for name in names if now.explanation and not self.likelihood.leaves_noise(now) else ():
+            if (plain := self.likelihood.plain(now, name)) is not None:
+                tried = self.round(plain, untried)
+                best, grown = self._with_refinements(now, plain, tried)
+                if best is not None:
+                    return best, grown, tried
+        return None, None, UNTRIED
+
+    def _with_refinements(self, now: M, plain: M, tried: SearchRound[P, F]) -> tuple[F | None, M | None]:
+        """An effect more and the likeliest model with it, of those tried on a model without the refinements of an
+        effect, which are sought beside it: without it they may imitate it. None where that is not likelier than the
+        model with these alone, or the effect evident neither without them nor over that."""
+        found: F | None = None
+        grown: M | None = None
+        least = now.score - INDISTINGUISHABLE
+        for one in tried.fits:
+            if self.is_accepted(plain, one) or self.may_imitate(plain, one):
+                self.progress(f"is it {one.effect.name} beside refinements?")
+                more = self._refined(self.likelihood.with_effect(one))
+                added = more.effects[-1]
+                if more.score < least and not added.at_bound and (
+                        self.is_accepted(plain, one) or self._is_evident(now, added, now.score - more.score, more)):
+                    found, grown, least = one, more, more.score
+        return found, grown
+
+    def _reconsidered(self, before: M, now: M, tried: SearchRound[P, F]) -> M:
         """The model with others in the place of its effects, where what is left is within sensors' calibration and an
         effect explains a part of it: it may be the right one, and what it would be added to its imitation."""
         if not self.likelihood.is_within_calibration(now) or not any(self.may_imitate(now, one) for one in tried.fits):
             return now
         other, rivals = now, dict(self._rivals)
         for name in names_of(now)[self.present:]:
-            other = self._reconsider(other, name)
+            other = self._reconsider(before, other, name)
         if other.score < now.score - INDISTINGUISHABLE:
             return other
         self._rivals = rivals
@@ -517,10 +557,11 @@ class Search(Generic[M, P, F]):
         """Whether an effect's gain over a model is more than chance or imitation would give. Where nothing is left to
         explain, or what is left with it (``there``) is noise, nothing is imitated; nor by what explains most of the
         power, be it in so few lines of a spectrum that a likelihood, which counts lines, has hardly gained. Of what a
-        sensor may be off by, whose form nobody knows, an effect may imitate a larger part."""
+        sensor may be off by, whose form nobody knows, an effect may imitate a larger part; and of anything one that
+        changes all of a record."""
         if not self._chance_of(without, one, gain) < FALSE_ALARM:
             return False
-        if without.explanation == 0 or (gain > IMITATION * without.explanation
+        if without.explanation == 0 or (gain > IMITATION * without.explanation and not one.effect.imitates_any
                                         and not self.likelihood.is_within_calibration(without)):
             return True
         return self.likelihood.leaves_noise(there) or self.likelihood.explains_most(without, there)
@@ -558,11 +599,12 @@ class Search(Generic[M, P, F]):
         simpler = self._complexity(other.chosen) < self._complexity(one)
         return other.gain > gain + (-INDISTINGUISHABLE if simpler else INDISTINGUISHABLE)
 
-    def _reconsider(self, now: M, name: str, added_to: M | None = None) -> M:
+    def _reconsider(self, before: M, now: M, name: str, added_to: M | None = None) -> M:
         """The model, or one with another effect in the place of this one, if that is preferred: of all that any round
         fitted, and all with the same parameters. A sharp resonance gains nothing at another frequency, and screening
         tries few frequencies.
 
+        before      the model without any effects that were found
         added_to    the model that it was just added to, on which the others were tried; None: it was added before
         """
         here = next(one for one in now.effects if one.effect.name == name)
@@ -574,8 +616,10 @@ class Search(Generic[M, P, F]):
                       f"is it {name}, or {' or '.join(one.name for one in may_be)}?")
         without = added_to or self.without(now, name)
         gain = without.score - now.score
-        tried = self.round(without, may_be if added_to is not None else [*may_be, here.effect], here,
-                           self.likelihood.stripped(now, name), gain)
+        base = self.likelihood.stripped(now, name)
+        if base is not None and base.score > before.score:
+            base = None  # the car's own numbers have moved too far to make room for it
+        tried = self.round(without, may_be if added_to is not None else [*may_be, here.effect], here, base, gain)
         best = self._simplest(without, tried)
         alike: tuple[str, ...] = ()
         if best is not None and self._is_preferred(best, here, gain):

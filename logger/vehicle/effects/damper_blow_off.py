@@ -1,6 +1,8 @@
 """Beyond a knee velocity the valves of a damper open, and its force grows more slowly: a digressive damper.
 
-Up to the knee the force is that of the damper without it; beyond, what it would grow by is multiplied by the ratio.
+Up to the knee the force is that of the damper without it; beyond, what it would grow by is multiplied by a ratio. Each
+direction has valves of its own: where these differ, the knee in rebound is the square root of a ratio times the knee
+velocity and that in bump the knee velocity over that root, and so are the slopes beyond.
 """
 
 from __future__ import annotations
@@ -21,18 +23,26 @@ class DamperBlowOff(ForceEffect):
                   "suspension rate above which the slope is smaller"),
         Parameter("slope_ratio", 0.4, 0.0, 1.0, 1.0, Scale.LINEAR, (0.4,),
                   "slope beyond the knee over that before it"),
+        Parameter("rebound_to_bump_knee_ratio", 1.0, 0.05, 20.0, None, Scale.LOG, (0.6, 1.7),
+                  "knee velocity in rebound over that in bump", default=1.0),
+        Parameter("rebound_to_bump_slope_ratio", 1.0, 0.05, 20.0, None, Scale.LOG, (1.0,),
+                  "slope_ratio in rebound over that in bump", default=1.0),
         AXLE,
     )
+    refinements = ("rebound_to_bump_knee_ratio", "rebound_to_bump_slope_ratio")
     source = "J. C. Dixon, The Shock Absorber Handbook (2007), chapter 6: digressive characteristics"
     signature = "the damping falls as the road gets rougher: strong motions ring longer than in the model"
     shown_by = "drive the same road slowly and fast, or a smooth and a rough one: the damping must differ"
 
     def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
-        damper, knee = laws.damper, p.knee_velocity_m_per_s
+        damper, knee, slope = laws.damper, p.knee_velocity_m_per_s, p.slope_ratio
+        uneven_knee, uneven_slope = (np.sqrt(one) for one in (p.rebound_to_bump_knee_ratio,
+                                                              p.rebound_to_bump_slope_ratio))
 
         def digressive(rate_mps: Array) -> Array:
-            inner = np.clip(rate_mps, -knee, knee)
-            return damper(inner) + p.slope_ratio * (damper(rate_mps) - damper(inner))
+            inner = np.clip(rate_mps, -knee / uneven_knee, knee * uneven_knee)
+            beyond = slope * np.where(rate_mps > 0, uneven_slope, 1 / uneven_slope)
+            return damper(inner) + beyond * (damper(rate_mps) - damper(inner))
 
         return replace(laws, damper=digressive)
 

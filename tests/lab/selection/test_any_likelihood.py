@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import pytest
 
@@ -96,6 +97,10 @@ class MadeUp:
         refined = replace(by_name[name], values={**by_name[name].values, "static_to_sliding_ratio": 1.5})
         return replace(now, effects=tuple({**by_name, name: refined}.values()))
 
+    def plain(self, now: Made, name: str) -> Made:
+        return replace(now, effects=tuple(chosen(one.effect, one.effect.usual) if one.effect.name == name else one
+                                          for one in now.effects))
+
     def chance(self, one: Chosen, gain: float, base: Made, candidates: int) -> float:
         return probability_by_chance(gain, candidates)
 
@@ -107,6 +112,8 @@ class MadeUp:
 
     def explains_most(self, without: Made, there: Made | Tried) -> bool:
         model = there.model if isinstance(there, Tried) else there
+        if without.score - model.score > without.explanation / 2:
+            return True
         return len(model.effects) > len(without.effects) and any(not one.is_plain for one in model.effects)
 
     def is_within_calibration(self, without: Made) -> bool:
@@ -158,8 +165,10 @@ def test_what_promises_too_little_beside_a_fit_that_may_be_taken_is_not_fitted(d
 
 
 @pytest.mark.parametrize(("to_explain", "named"), [(590.0, True), (610.0, False)])
-def test_what_gains_a_tenth_of_what_is_left_may_only_imitate(to_explain: float, named: bool) -> None:
+def test_what_gains_a_tenth_of_what_is_left_may_only_imitate(to_explain: float, named: bool,
+                                                             monkeypatch: pytest.MonkeyPatch) -> None:
     assert IMITATION == 0.1
+    monkeypatch.setitem(WORTH, "sensor_gain", 310.0)  # most of it, as a sensor's effect has to gain
     sought = search()
     found = sought.run(Made(explains=to_explain))
     assert ("sensor_offset" in found.gains) == named
@@ -180,15 +189,45 @@ def test_what_seems_to_imitate_is_found_where_it_shows_refinements_of_what_was_f
     assert [one.is_plain for one in found.now.effects] == [False, True][-1 - friction:]
 
 
-def test_refinements_of_what_was_found_are_judged_before_a_further_effect_is_sought(
+def test_refinements_of_what_was_found_are_judged_beside_a_further_effect(
         monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(WORTH, "dry_friction", 700.0)
     sought, bases = search(effects=2), list[Made]()
     sought.effects = [EFFECTS["dry_friction"], EFFECTS["sensor_gain"]]
     screened = MadeUp.screened
     monkeypatch.setattr(MadeUp, "screened", lambda self, base, *rest: bases.append(base) or screened(self, base, *rest))
-    sought.run(Made())
-    assert [[one.is_plain for one in base.effects] for base in bases[:2]] == [[], [False]]
+    found = sought.run(Made())
+    assert [[one.is_plain for one in base.effects] for base in bases[:2]] == [[], [True]]
+    assert [one.is_plain for one in found.now.effects] == [False, True]
+
+
+@pytest.mark.parametrize(("worth", "known"), [(430.0, "sensor_gain"), (370.0, "tire_damping")])
+def test_what_changes_all_of_a_record_has_to_explain_most_of_what_is_left(
+        worth: float, known: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(WORTH, "sensor_gain", worth)
+    found = search().run(Made(explains=800.0))
+    assert found.steps[0][0] == known and ("sensor_gain" in found.gains) == (known == "sensor_gain")
+
+
+class Imitated(MadeUp):
+    """Refinements of friction that beside another effect gain more, but not where they were fitted without it."""
+
+    def screened(self, base: Made, *rest: Any) -> list[Tried]:
+        refined = any(not one.is_plain for one in base.effects)
+        return [replace(one, gain=one.gain * (not refined)) for one in super().screened(base, *rest)]
+
+    def fitted_roughly(self, score: float, base: Made, one: Tried, least: float) -> list[Tried]:
+        return [replace(each, gain=one.gain) for each in super().fitted_roughly(score, base, one, least)]
+
+
+def test_what_refinements_imitate_is_found_beside_the_plain_form(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(WORTH, "dry_friction", 700.0)
+    sought = search()
+    sought.effects = [EFFECTS["dry_friction"], EFFECTS["tire_damping"]]
+    sought.likelihood = Imitated()
+    found = sought.run(Made())
+    assert [*found.gains] == ["dry_friction", "tire_damping"]
+    assert [one.is_plain for one in found.now.effects] == [False, True]
 
 
 @pytest.mark.parametrize("later", WORTH)
