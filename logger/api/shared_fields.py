@@ -36,8 +36,8 @@ TrackedRuns = Annotated[Runs, Argument(
     "folder with drive.csv and profile.csv (of a rig: excitation.csv)", metavar="RUN", read=Path, many=list)]
 Tolerance = Annotated[float | str | None, Option(
     "share by which masses, springs and dampers may be off, where the vehicle's file does not say (default: "
-    f"{USUAL_TOLERANCE:g}; their standard deviation is 0.625 of that; lengths have 0.02). {UNKNOWN}: no parameter is "
-    "known",
+    f"{USUAL_TOLERANCE:g}; their standard deviation is 0.625 of that; lengths have 0.02). {UNKNOWN}: nothing is "
+    "known of these",
     metavar=f"SHARE|{UNKNOWN}", read=word_or_number(UNKNOWN, TOLERANCE),
     check=check_word_or_number(UNKNOWN, TOLERANCE))]
 Candidates = Annotated[Collection[str] | None, "names of the effects to be tried; None: all"]

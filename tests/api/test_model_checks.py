@@ -33,12 +33,12 @@ def stuck(tmp_path: Path, road: str, friction_n: int) -> SimulatedRuns:
     return driven(tmp_path, road, 6, f"dry_friction:friction_force_n={friction_n}")
 
 
-def driven(tmp_path: Path, road: str, speed_mps: float, effect: str) -> SimulatedRuns:
+def driven(tmp_path: Path, road: str, speed_mps: float, effect: str, vehicle: str = "rav4-2009") -> SimulatedRuns:
     """A drive of a car with one effect."""
     folder = tmp_path / "run"
     folder.mkdir()
     main(["road", "generate", "--class", road, "--length", "250", "--seed", "5", "--out", str(folder / "profile.csv")])
-    main(["simulate", "--vehicle", "rav4-2009", "--profile", str(folder / "profile.csv"), "--speed", f"{speed_mps:g}",
+    main(["simulate", "--vehicle", vehicle, "--profile", str(folder / "profile.csv"), "--speed", f"{speed_mps:g}",
           "--effect", effect, "--out", str(folder / "drive.csv")])
     return checked_runs([read_run(folder)])
 
@@ -66,6 +66,32 @@ def test_a_sensor_far_from_the_centre_of_gravity_is_no_wrong_input(tmp_path: Pat
     for run, sign in ((runs.runs[0], 1), (replace(runs.runs[0], measured_mps2=-runs.runs[0].measured_mps2), -1)):
         found = match_below_bounce(run, run.main(prediction), body_hz)
         assert sign * (found.correlation - found.turned) > 0.25
+
+
+def car_yaml(front: tuple[int, int], rear: tuple[int, int]) -> str:
+    """A car's file with these springs [N/m] and dampers [N s/m]."""
+    axles = "".join(
+        f"{name}:\n  cg_distance_m: 1.45\n  unsprung_mass_kg: 80\n  suspension_stiffness_n_per_m: {spring}\n"
+        f"  suspension_damping_n_s_per_m: {damper}\n  tire_stiffness_n_per_m: 300000\n"
+        for name, (spring, damper) in (("front", front), ("rear", rear)))
+    return (f"name: other\nmodel: half_car\nsprung_mass_kg: 1040\npitch_inertia_kg_m2: 2240\n{axles}"
+            "contact_patch_m: 0.18\neffects: []\n")
+
+
+OWN, FILED = car_yaml((31900, 1900), (35200, 2200)), car_yaml((38000, 1090), (63200, 3470))
+
+
+@pytest.mark.parametrize(("filed", "sign", "is_turned"), [(FILED, 1, False), (OWN, 1, False), (OWN, -1, True)])
+def test_where_springs_are_not_known_the_way_up_is_that_below_the_lowest_bounce_they_allow(
+        tmp_path: Path, filed: str, sign: int, is_turned: bool) -> None:
+    """Between its own bounce and that of a file with springs up to twice as stiff, a body moves against its model."""
+    (own := tmp_path / "own.yaml").write_text(OWN, "utf-8")
+    (file := tmp_path / "file.yaml").write_text(filed, "utf-8")
+    run, = driven(tmp_path, "A", 8.3, "sensor_offset:offset_m=-1", str(own)).runs
+    runs = SimulatedRuns([replace(run, measured_mps2=sign * run.measured_mps2)])
+    said: list[str] = []
+    check_model("other", read_model(file), runs, said.append, {}, Tolerance().widened(), anyway=True)
+    assert any("upside down" in one for one in said) is is_turned
 
 
 @pytest.mark.slow

@@ -241,14 +241,15 @@ def planned_bench(word: str, model: CarModel, drives: Sequence[Run], effect_file
 
 def tolerance_of(said: float | str | None, known: Mapping[str, Known] = MappingProxyType({})) -> Tolerance:
     """How well a car's numbers are known: as its file says (``known``), and the others to what the user said, a share
-    of masses, springs and dampers either way, or that all are unknown; None: the usual one. BadInput for a share that
+    of masses, springs and dampers either way, or that they are unknown; None: the usual one. BadInput for a share that
     no car's numbers have."""
-    if said == UNKNOWN:
-        return Tolerance().widened()
+    by_file = Tolerance.of(known)
     if said is None:
-        return Tolerance.of(known)
+        return by_file
+    if said == UNKNOWN:
+        return by_file.widened()
     TOLERANCE.check("tolerance", float(said))
-    return replace(Tolerance.of(known), numbers=float(said) / Tolerance.band)
+    return replace(by_file, numbers=float(said) / Tolerance.band)
 
 
 def _scales(word: str, model: CarModel, runs: SimulatedRuns) -> Scales | None:

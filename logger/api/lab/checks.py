@@ -66,6 +66,7 @@ from logger.vehicle.effect import Chosen, Effect
 from logger.vehicle.effects.sensor_gain import EFFECT as SENSOR_GAIN
 from logger.vehicle.models import structure_of
 from logger.vehicle.modes import body_and_wheels_hz, undamped_frequencies_hz
+from logger.vehicle.named_parameters import WEAKEST
 from logger.vehicle.simulate import resampled
 from logger.vehicle.stepping_loop import COMPILED
 from logger.vehicle.vehicle import Vehicle
@@ -103,7 +104,8 @@ def check_model(word: str, model: CarModel, runs: SimulatedRuns, warn: Callable[
     """
     predictions = check_moves(word, model, runs)
     car = compose(model.vehicle, model.effects)
-    followed, rig = _followed(runs, predictions, car), _likeliest_rig(model, runs, predictions, tolerance)
+    followed = _followed(runs, predictions, car, tolerance)
+    rig = _likeliest_rig(model, runs, predictions, tolerance)
     # One after the other: whether it is the car is asked of runs that are right, and takes seconds.
     _say(chain(_other_ways_up(runs, followed), _other_units(runs, followed),
                _other_units_on_rig(runs, rig), _other_units_of_signals(runs, predictions),
@@ -132,9 +134,10 @@ def check_roads(word: str, model: CarModel, runs: SimulatedRuns, warn: Callable[
     """Raise BadInput where a run was driven over another road than that of its profile, or a rig's is in another unit,
     as ``check_model``: all that can be asked where the vehicle's numbers may be far off."""
     car, predictions = compose(model.vehicle, model.effects), predicted(word, model, runs, model.effects)
-    rig = _likeliest_rig(model, runs, predictions, Tolerance.of(model.known).widened())
-    _say(chain(_other_units_on_rig(runs, rig), _other_roads(runs, _followed(runs, predictions, car), car)), warn,
-         anyway)
+    tolerance = Tolerance.of(model.known).widened()
+    followed = _followed(runs, predictions, car, tolerance)
+    rig = _likeliest_rig(model, runs, predictions, tolerance)
+    _say(chain(_other_units_on_rig(runs, rig), _other_roads(runs, followed, car)), warn, anyway)
 
 
 def predicted(word: str, model: CarModel, runs: SimulatedRuns, effects: Sequence[Chosen]) -> list[Array]:
@@ -160,10 +163,13 @@ def _say(complaints: Iterable[str], warn: Callable[[str], None], anyway: bool) -
 @dataclass(frozen=True)
 class _Followed:
     """How well each run goes with its road: around the body's bounce, in this band [Hz], and below it, at any lag and
-    within the half wave at hand. What is wrong with a whole record, its sign or its unit, is wrong in both bands."""
+    within the half wave at hand. What is wrong with a whole record, its sign or its unit, is wrong in both bands. Below
+    is below the lowest bounce that the file allows: between the car's own bounce and the file's a body moves against
+    its model."""
 
     pairs: list[tuple[Run, Array]]
     body_hz: Array
+    lowest_body_hz: Array
 
     @cached_property
     def band_hz(self) -> tuple[float, float]:
@@ -175,18 +181,20 @@ class _Followed:
 
     @cached_property
     def below(self) -> list[RoadMatch]:
-        band_hz = below_bounce_band_hz(self.body_hz)
+        band_hz = below_bounce_band_hz(self.lowest_body_hz)
         return [road_match(run, prediction, band_hz) for run, prediction in self.pairs]
 
     @cached_property
     def below_at_hand(self) -> list[RoadMatch]:
-        return [match_below_bounce(run, prediction, self.body_hz) for run, prediction in self.pairs]
+        return [match_below_bounce(run, prediction, self.lowest_body_hz) for run, prediction in self.pairs]
 
 
-def _followed(runs: SimulatedRuns, predictions: Sequence[Array], car: Car) -> _Followed:
+def _followed(runs: SimulatedRuns, predictions: Sequence[Array], car: Car, tolerance: Tolerance) -> _Followed:
     body_hz, _ = body_and_wheels_hz(structure_of(car.vehicle))
+    # A bounce is the root of a spring over a mass, each of which may be a standard deviation off.
+    lowest = float(np.exp(-min(tolerance.largest, WEAKEST) / np.sqrt(2)))
     return _Followed([(run, run.main(one)) for run, one in zip(runs.runs, predictions, strict=True) if len(body_hz)],
-                     body_hz)
+                     body_hz, lowest * body_hz)
 
 
 def _moves(run: Run, prediction: Array) -> bool:
@@ -198,25 +206,28 @@ def _moves(run: Run, prediction: Array) -> bool:
 
 def _other_ways_up(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
     """Which runs are upside down."""
-    for k, ((run, _), around) in enumerate(zip(followed.pairs, followed.around, strict=True)):
-        if around.is_upside_down and (below := followed.below_at_hand[k]).turned > below.correlation:
+    for (run, _), around, below in zip(followed.pairs, followed.around, followed.below_at_hand, strict=True):
+        if below.is_upside_down or (around.is_upside_down and below.turned > below.correlation):
             yield (f"{run.name}: expected {run.facts.main.name} up positive, found them upside down: with the sign "
-                   f"changed they follow the model (correlation {around.turned:.2f})")
+                   f"changed they follow the model (correlation {max(around.turned, below.turned):.2f})")
 
 
 def _other_units(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
-    """Which runs on roads, or profiles, are in another unit, the nearest one. A factor that a sensor's gain may be is a
-    unit only if it is one, and all runs agree, and below the bounce the median of the runs as well: there the body
-    moves with the road whatever is missing, but one run holds few such waves."""
+    """Which runs on roads, or profiles, are in another unit, the nearest one. Below the bounce the body moves with the
+    road whatever is missing, but one run holds few such waves: the median of the runs has to be nearer to a unit than
+    to 1. A factor that a sensor's gain may be is a unit only if it is one, and all runs and that median agree."""
     if not followed.pairs or followed.pairs[0][0].timed:
         return
     clear = [(run, around.gain, below.gain) for (run, _), around, below in
              zip(followed.pairs, followed.around, followed.below, strict=True)
              if around.is_clear and run.facts.main.measures == "acceleration"]
+    below_gain = median(below for _, _, below in clear) if clear else 1.0
+    if min((1.0, *(size for _, _, size in _UNITS)), key=lambda size: abs(log(below_gain / size))) == 1:
+        return
     for run, gain, _ in clear:
         what, unit, size = min(_UNITS, key=lambda one: abs(log(gain / one[2])))
         may_be_else = SENSOR_GAIN.parameters[0].low < gain < SENSOR_GAIN.parameters[0].high
-        gains = [*(around for _, around, _ in clear), median(below for _, _, below in clear)]
+        gains = [*(around for _, around, _ in clear), below_gain]
         if not may_be_else or all(abs(one / size - 1) < _NEAR for one in gains):
             yield (f"{run.name}: expected accelerations in m/s2 and elevations in m, found {gain:.3g} times what the "
                    f"model says: {what} in {unit}")
