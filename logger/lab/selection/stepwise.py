@@ -170,6 +170,10 @@ class Likelihood(Protocol[M, P, F]):
         """Whether what a model leaves is within what calibrated sensors may be off by."""
         return False
 
+    def imitates_any(self, one: Effect) -> bool:
+        """Whether an effect imitates a part of anything, and it shows whether it explains most of it."""
+        return False
+
 
 class MeasuredRoad:
     """The likelihood of drives over a road that was measured."""
@@ -254,6 +258,10 @@ class MeasuredRoad:
     def is_within_calibration(self, without: Baseline) -> bool:
         """Of rigs."""
         return without.is_within_calibration
+
+    def imitates_any(self, one: Effect) -> bool:
+        """As the effect says."""
+        return one.imitates_any
 
 
 @dataclass(frozen=True, eq=False)
@@ -561,8 +569,8 @@ class Search(Generic[M, P, F]):
         changes all of a record."""
         if not self._chance_of(without, one, gain) < FALSE_ALARM:
             return False
-        if without.explanation == 0 or (gain > IMITATION * without.explanation and not one.effect.imitates_any
-                                        and not self.likelihood.is_within_calibration(without)):
+        may_imitate = self.likelihood.imitates_any(one.effect) or self.likelihood.is_within_calibration(without)
+        if without.explanation == 0 or (gain > IMITATION * without.explanation and not may_imitate):
             return True
         return self.likelihood.leaves_noise(there) or self.likelihood.explains_most(without, there)
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -16,7 +16,7 @@ from logger.lab.laws.draft import LEARNED, Draft, Family, FormatNumber, LawConte
 from logger.lab.laws.learn import Learning, learn
 from logger.plugins import catalogue
 from logger.store.formats.effect_file import own_effect, shipped_effects
-from logger.vehicle.effect import AXLE, Chosen, ForceEffect, RecordEffect, Recording, chosen
+from logger.vehicle.effect import AXLE, Chosen, Effect, ForceEffect, RecordEffect, Recording, chosen
 from logger.vehicle.laws import CornerLaws, linear
 
 from ...support.lab.secret_runs import EFFECTS, NOISE_MPS2, hidden, posterior_of, secret_runs
@@ -36,9 +36,12 @@ class QuadraticDamping(ForceEffect):
         return laws.with_force(lambda travel_m, rate_mps: SQUARE_N_S2_PER_M2 * rate_mps * np.abs(rate_mps))
 
 
-def learned(effects: Sequence[Chosen], **how: Any) -> Learning:
+UNKNOWN_SQUARE = {name: one for name, one in EFFECTS.items() if name != "orifice_damping"}
+
+
+def learned(effects: Sequence[Chosen], known: Mapping[str, Effect] = EFFECTS, **how: Any) -> Learning:
     posterior = posterior_of(secret_runs(effects, **how))
-    return learn(posterior, {name: EFFECTS[name] for name in FEW}, FAMILIES, EFFECTS)
+    return learn(posterior, {name: EFFECTS[name] for name in FEW}, FAMILIES, known)
 
 
 @cache
@@ -77,9 +80,9 @@ def test_a_law_of_one_axle_leaves_the_other_alone() -> None:
 
 
 @pytest.mark.slow
-def test_a_damping_by_the_square_of_the_rate_is_learned() -> None:
-    found = learned([chosen(QuadraticDamping(), {})], rougher=2.0)
-    law = found.law
+def test_a_damping_by_the_square_of_the_rate_is_learned_where_no_effect_is_one() -> None:
+    assert learned([chosen(QuadraticDamping(), {})], rougher=2.0).verdict == ("orifice_damping",)
+    law = learned([chosen(QuadraticDamping(), {})], UNKNOWN_SQUARE, rougher=2.0).law
     assert law is not None
     assert law.draft.family.name == "force_by_rate" and not law.effects and not law.one.where
     assert law.one.values["power_ratio"] == pytest.approx(2.0, abs=0.05)
@@ -110,7 +113,8 @@ def test_the_law_after_one_that_is_refused_is_learned() -> None:
     right, progress = FAMILIES["force_by_rate"], list[str]()
     posterior = posterior_of(secret_runs([chosen(QuadraticDamping(), {})], rougher=2.0))
     few = {name: EFFECTS[name] for name in FEW[:2]}
-    law = learn(posterior, few, {one.name: one for one in (Straight(right), right)}, EFFECTS, (), progress.append).law
+    families = {one.name: one for one in (Straight(right), right)}
+    law = learn(posterior, few, families, UNKNOWN_SQUARE, (), progress.append).law
     assert f"{LEARNED}{Straight.name} is missing; fitting the model with it" in progress
     assert law is not None and law.draft.family is right
 

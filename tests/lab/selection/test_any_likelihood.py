@@ -119,6 +119,9 @@ class MadeUp:
     def is_within_calibration(self, without: Made) -> bool:
         return False
 
+    def imitates_any(self, one: Effect) -> bool:
+        return one.imitates_any
+
 
 def search(*doubtful: str, effects: int = 4) -> Search[Made, Tried, Tried]:
     return Search([EFFECTS[name] for name in WORTH], 0, Misalignment(1.0, 0.0), workers=1,
