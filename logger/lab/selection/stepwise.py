@@ -327,8 +327,18 @@ class Search(Generic[M, P, F]):
         return self._refined(self.likelihood.with_effect(best))
 
     def run(self, before: M) -> Selection[M, P, F]:
-        """Search on top of a fitted model."""
-        return self.go_on(Selection(before, before, {}, {}, UNTRIED, ()))
+        """Search on top of a fitted model. Where it ends with refinements of an effect and leaves more than noise, they
+        may imitate others together: these are sought without that effect, and taken where they are likelier."""
+        found = self.go_on(Selection(before, before, {}, {}, UNTRIED, ()))
+        refined = [one.effect for one in found.now.effects[self.present:] if not one.is_plain]
+        if not refined or found.now.explanation == 0 or self.likelihood.leaves_noise(found.now):
+            return found
+        self.progress(f"is it {' and '.join(one.name for one in refined)}, or others together?")
+        rest = replace(self, effects=[one for one in self.effects if one not in refined], _promising=set(), _rivals={})
+        other = rest.run(before)
+        if other.now.score > found.now.score - INDISTINGUISHABLE:
+            return found
+        return replace(other, first=found.first) if other.before is found.before else other
 
     def go_on(self, begun: Selection[M, P, F], known: SearchRound[P, F] | None = None) -> Selection[M, P, F]:
         """A search that ended because it had found as many effects as it might, with more of them; ``known``: the round
