@@ -23,6 +23,7 @@ from logger.arrays import Array
 
 # A patch shorter than this is a point: averages over less would drown in rounding, and no profile is so fine.
 _POINT_M = 1e-4
+_MOST_SPACINGS = 5_000_000  # as many samples as a simulation may hold in memory at once
 # The mean over a step shorter than this is that of its two ends, for the same reason.
 SHORT_STEP_M = 1e-4
 # Knots nearer to each other than this share of a spacing are one.
@@ -192,13 +193,16 @@ class Track:
 class TirePath:
     """Elevations (n,) at start_m, start_m + spacing_m, ..., averaged over a contact patch [m].
 
-    ValueError for a patch below 0. The pieces are [knot, next knot) of the average. A patch that is no whole number of
-    spacings puts two knots in each spacing, one where its front edge and one where its rear edge passes a sample.
+    ValueError for a patch below 0, OverflowError for one that no memory holds, which a fit may try. The pieces are
+    [knot, next knot) of the average. A patch that is no whole number of spacings puts two knots in each spacing, one
+    where its front edge and one where its rear edge passes a sample.
     """
 
     def __init__(self, start_m: float, spacing_m: float, elevation_m: Array, patch_m: float) -> None:
-        if not 0 <= patch_m < np.inf:
+        if not patch_m >= 0:
             raise ValueError(f"expected a contact patch of 0 m or more, found {patch_m}")
+        if patch_m > _MOST_SPACINGS * spacing_m:
+            raise OverflowError(f"expected a contact patch that is a part of a road, found {patch_m} m")
         self._spacing_m = spacing_m
         self._base_m = float(elevation_m.mean())
         heights = elevation_m - self._base_m

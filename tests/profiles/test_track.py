@@ -8,6 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.interpolate import make_interp_spline
 
+from logger.lab.likelihood.posterior import NotSimulated
 from logger.profiles.track import TirePath, Track
 
 START_M = 3.0
@@ -92,6 +93,13 @@ def test_what_is_no_track_is_refused(spacing_m: float, elevation_m: np.ndarray, 
 
 
 def test_a_patch_below_nothing_is_refused() -> None:
-    for patch_m in (-0.1, np.nan, np.inf):
+    for patch_m in (-0.1, np.nan):
         with pytest.raises(ValueError, match="contact patch"):
+            Track(0.1, np.zeros(3)).averaged([0.0], patch_m)
+
+
+def test_a_patch_that_no_memory_holds_is_no_car() -> None:
+    """A step of a fit that goes too far is taken back, as of a car that moves without bound."""
+    for patch_m in (1e12, np.inf):
+        with pytest.raises(NotSimulated, match="contact patch"):
             Track(0.1, np.zeros(3)).averaged([0.0], patch_m)
