@@ -1,7 +1,7 @@
 """What a study is: a table or a figure that was printed, made again and set beside what is printed there.
 
-Every file of a shelf's folder offers some as ``STUDIES``. A study holds the printed values, so that what is ours is
-never seen without them, and says of each printed item in a word and a sentence how they agree, and why where they do
+Every file of a shelf's folder offers some as ``STUDIES``. A study holds the printed values, so that this program's
+are never seen without them, and says of each in a word and a sentence how they agree, and why where they do
 not. The word that it states has to come out of its checks (``Value``, ``Statement``). The records that the
 dissertation measured were never published: where it measured, a study simulates under the conditions that the text
 gives, and says so.

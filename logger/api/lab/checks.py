@@ -218,16 +218,18 @@ def _other_units(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
     to 1. A factor that a sensor's gain may be is a unit only if it is one, and all runs and that median agree."""
     if not followed.pairs or followed.pairs[0][0].timed:
         return
-    clear = [(run, around.gain, below.gain) for (run, _), around, below in
+    clear = [(run, around.gain, below) for (run, _), around, below in
              zip(followed.pairs, followed.around, followed.below, strict=True)
              if around.is_clear and run.facts.main.measures == "acceleration"]
-    below_gain = median(below for _, _, below in clear) if clear else 1.0
-    if min((1.0, *(size for _, _, size in _UNITS)), key=lambda size: abs(log(below_gain / size))) == 1:
+    waves = [below.gain for _, _, below in clear if max(below.correlation, below.turned) > 0]
+    below_gain = [median(waves)] if waves else []
+    factors = np.log([1.0, *(size for _, _, size in _UNITS)])
+    if below_gain and np.abs(np.log(below_gain) - factors).argmin() == 0:
         return
     for run, gain, _ in clear:
         what, unit, size = min(_UNITS, key=lambda one: abs(log(gain / one[2])))
         may_be_else = SENSOR_GAIN.parameters[0].low < gain < SENSOR_GAIN.parameters[0].high
-        gains = [*(around for _, around, _ in clear), below_gain]
+        gains = [*(around for _, around, _ in clear), *below_gain]
         if not may_be_else or all(abs(one / size - 1) < _NEAR for one in gains):
             yield (f"{run.name}: expected accelerations in m/s2 and elevations in m, found {gain:.3g} times what the "
                    f"model says: {what} in {unit}")

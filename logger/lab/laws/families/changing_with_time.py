@@ -1,9 +1,9 @@
 """Springs, tires or dampers that change as a run goes on: air that warms up in a tire makes it stiffer, rubber softer,
 and oil grows thin.
 
-What answers to a motion is, of what the model has, 1 + s (1 - exp(-t / T)) in the end: it changes by the share s, most
-of it in the time T. A tire's stiffness grows with its pressure (J. Y. Wong, Theory of Ground Vehicles, 2008, chapter
-1), and that with the temperature; dampers fade (J. C. Dixon, The Shock Absorber Handbook, 2007, section 6.7).
+The force of the model is multiplied by 1 + s (1 - exp(-t / T)): it changes by the share s, most of it in the time T.
+A tire's stiffness grows with its pressure (J. Y. Wong, Theory of Ground Vehicles, 2008, chapter 1), and that with the
+temperature; dampers fade (J. C. Dixon, The Shock Absorber Handbook, 2007, section 6.7).
 """
 
 from __future__ import annotations
@@ -23,7 +23,8 @@ _METHOD = """def laws(self, p, laws):
 
 class ChangingWithTime(Family):
     title = "damping or stiffness that changes during a run"
-    source = "J. Y. Wong, Theory of Ground Vehicles (2008), chapter 1; J. C. Dixon, The Shock Absorber Handbook (2007)"
+    source = ("J. Y. Wong, Theory of Ground Vehicles (2008), chapter 1; J. C. Dixon, The Shock Absorber Handbook "
+              "(2007), section 6.7")
     shown_by = "drive one rough road for half an hour from cold, recorded as one run"
 
     def drafts(self, context: LawContext) -> list[Draft]:
@@ -45,8 +46,8 @@ class ChangingWithTime(Family):
 def _draft(what: str, motion: str, of: str, between: str, lasts_s: float) -> Draft:
     times = tuple(rounded(share * lasts_s) for share in (0.1, 0.3, 1.0))
     parameters = (
-        Parameter("changed_ratio", 0.1, -0.95, 3.0, 0.0, Scale.LINEAR, (0.2, -0.2), f"final change of the {what}, of "
-                  f"{of.removeprefix('laws.')}", step=0.02),
+        Parameter("changed_ratio", 0.1, -0.95, 3.0, 0.0, Scale.LINEAR, (0.2, -0.2), f"final change of the {what}, as a "
+                  f"share of {'their damping' if of.startswith('laws.') else of + ' N/m'}", step=0.02),
         Parameter("time_s", times[1], rounded(0.01 * lasts_s), rounded(10 * lasts_s), None, Scale.LOG, times,
                   "time constant of the change"))
     return FAMILY.draft(parameters, _METHOD.format(of=of, between=between), _FUNCTIONS.format(motion=motion),
