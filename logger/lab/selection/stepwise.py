@@ -329,16 +329,20 @@ class Search(Generic[M, P, F]):
     def run(self, before: M) -> Selection[M, P, F]:
         """Search on top of a fitted model. Where it ends with refinements of an effect and leaves more than noise, they
         may imitate others together: these are sought without that effect, and taken where they are likelier."""
-        found = self.go_on(Selection(before, before, {}, {}, UNTRIED, ()))
+        found = self._begun(before)
         refined = [one.effect for one in found.now.effects[self.present:] if not one.is_plain]
         if not refined or found.now.explanation == 0 or self.likelihood.leaves_noise(found.now):
             return found
         self.progress(f"is it {' and '.join(one.name for one in refined)}, or others together?")
         rest = replace(self, effects=[one for one in self.effects if one not in refined], _promising=set(), _rivals={})
-        other = rest.run(before)
+        other = rest.run(found.before)
         if other.now.score > found.now.score - INDISTINGUISHABLE:
             return found
         return replace(other, first=found.first) if other.before is found.before else other
+
+    def _begun(self, before: M) -> Selection[M, P, F]:
+        """The search without a second look at its refinements."""
+        return self.go_on(Selection(before, before, {}, {}, UNTRIED, ()))
 
     def go_on(self, begun: Selection[M, P, F], known: SearchRound[P, F] | None = None) -> Selection[M, P, F]:
         """A search that ended because it had found as many effects as it might, with more of them; ``known``: the round
@@ -379,7 +383,7 @@ class Search(Generic[M, P, F]):
             *earlier, added = names_of(now)[self.present:]
             last = UNTRIED
             if not earlier and (refitted := self.without(now, added)).score < before.score - INDISTINGUISHABLE:
-                return self.run(refitted)  # the effect led the fit of the car's own numbers out of a wrong minimum
+                return self._begun(refitted)  # the effect led the fit of the car's own numbers out of a wrong minimum
             steps.append((added, now.hold_out))
             for name in earlier:
                 now = self._reconsider(before, now, name)
