@@ -103,7 +103,7 @@ SPEED, RATE, ADDED = Range(0.1, 100.0, "m/s"), Range(10.0, 10_000.0, "Hz"), Rang
 NOISE, WINDOW = Range(1e-4, 100.0, "m/s2"), Range(1.0, 1000.0, "m")
 """Of an estimate: noise of a reading, length of a window."""
 AUTO, UNKNOWN = "auto", "unknown"
-"""Of a noise: learnt. Of a vehicle's numbers: nothing is known of them."""
+"""Of a noise: learned. Of a vehicle's numbers: nothing is known of them."""
 LENGTH, SPACING = Range(11.0, 1e6, "m"), Range(0.001, 0.3, "m")
 """Of a random road; a shorter one has no IRI."""
 ROUGHNESS, IRI, ROAD_WAVINESS = Range(1e-3, 1e7, "cm3"), Range(0.01, 1000, "m/km"), Range(1.5, 3.0)

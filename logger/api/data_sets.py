@@ -138,7 +138,7 @@ def unit_by_gravity(accel: Array) -> str:
 
 def driven_windows(recording: RoadRecording, vehicle: str, windows_m: tuple[float, ...] = WINDOWS_M,
                    profile: Path | None = None) -> list[DrivenWindows]:
-    """The windows of a pass, for each length those of all its drives; the sensor's noise is learnt from each drive.
+    """The windows of a pass, for each length those of all its drives; the sensor's noise is learned from each drive.
 
     profile    the measured line, with places, on which the pass is laid
 
@@ -200,12 +200,12 @@ def _write(path: Path, header: str, *columns: Array) -> None:
 
 
 def windows_of(run: Run, model: CarModel, windows_m: tuple[float, ...] = WINDOWS_M) -> list[DrivenWindows]:
-    """The windows of a drive, for each length; noise is learnt once. Raises BadInput."""
+    """The windows of a drive, for each length; noise is learned once. Raises BadInput."""
     sensor, learns = sensor_of(run)
     found = []
     for window_m in windows_m:
         one = assessed(run, model, sensor, learns, window_m, anyway=True)
-        sensor, learns = one.sensor, False  # learnt once
+        sensor, learns = one.sensor, False  # learned once
         edges_m = one.windows.edges_m
         if len(edges_m) < 2:
             continue

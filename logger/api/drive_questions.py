@@ -132,7 +132,7 @@ class EstimateQuestion(LongQuestion):
         "sensor sits; in Python a model as well", metavar="NAME|FILE", read=str)]
     _: KW_ONLY
     noise_mps2: Annotated[float | Literal["auto"] | None, Option(
-        f"r.m.s. noise of one reading before rounding, {NOISE.words}; auto: learnt from the drive, with a standard "
+        f"r.m.s. noise of one reading before rounding, {NOISE.words}; auto: learned from the drive, with a standard "
         "error (default: what the run's run.yaml says, or auto)", metavar="auto|MPS2",
         read=word_or_number(AUTO, NOISE), check=check_word_or_number(AUTO, NOISE))] = None
     step_mps2: Annotated[float | None, Option(

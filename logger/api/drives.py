@@ -302,7 +302,7 @@ def estimate(question: EstimateQuestion) -> Estimate:
 
 def sensor_of(run: Run, noise_mps2: float | str | None = None, step_mps2: float | None = None) -> tuple[Sensor, bool]:
     """What a reading is, by what somebody said, or where that is None by the run's facts; and whether its noise is a
-    guess and to be learnt: where nobody knows it, or ``AUTO`` is said."""
+    guess and to be learned: where nobody knows it, or ``AUTO`` is said."""
     step_mps2 = (run.facts.step_mps2 or 0.0) if step_mps2 is None else step_mps2
     known_mps2 = run.facts.noise_mps2 if noise_mps2 is None else noise_mps2
     if known_mps2 is None or isinstance(known_mps2, str):
@@ -312,7 +312,7 @@ def sensor_of(run: Run, noise_mps2: float | str | None = None, step_mps2: float 
 
 def assessed(run: Run, model: vehicle_file.CarModel, sensor: Sensor, learns_noise: bool, window_m: float,
              warn: Notify = silent, anyway: bool = False) -> Assessment:
-    """The road of a run, in windows; where the noise is to be learnt, the sensor's is a guess. BadInput ("file:line:
+    """The road of a run, in windows; where the noise is to be learned, the sensor's is a guess. BadInput ("file:line:
     expected ...") for a drive that cannot be used, and for a profile of another road, unless the user wants to go on
     ``anyway`` (then ``warn`` is called)."""
     if run.excitation is not None:
@@ -361,7 +361,7 @@ def as_json(run: str, found: Assessment) -> dict[str, Any]:
         "run": run, "vehicle": found.vehicle.name, "rate_hz": drive.rate_hz,
         "noise_mps2": found.sensor.noise_rms_mps2,
         "noise_std_mps2": None if found.noise is None else found.noise.std_mps2,
-        "noise_learnt": (found.noise is not None) if found.learns_noise else None,
+        "noise_learned": (found.noise is not None) if found.learns_noise else None,
         "step_mps2": found.sensor.step_mps2, "window_m": found.window_m,
         "distance_start_m": float(drive.distance_m[0]), "distance_end_m": float(drive.distance_m[-1]),
         "distance_moved_m": drive.moved_m, "compared": found.compared,
@@ -442,16 +442,16 @@ def blocks(found: Assessment, summary: dict[str, Any]) -> Iterator[Block]:
 
 
 def _sensor_lines(summary: dict[str, Any]) -> list[str]:
-    """What a reading is, and whether that was learnt or given."""
+    """What a reading is, and whether that was learned or given."""
     noise, std = summary["noise_mps2"], summary["noise_std_mps2"]
     rounded = f"rounded to {summary['step_mps2']:g} m/s2 (--step)" if summary["step_mps2"] else "not rounded (--step)"
-    if summary["noise_learnt"] is False:
+    if summary["noise_learned"] is False:
         return [f"This drive does not show the sensor's noise. Assumed: {noise:g} m/s2 in a reading, {rounded}"]
     if std is None:
         return [f"Assumed: noise of {noise:g} m/s2 in a reading (--noise), {rounded}"]
     shown = (f"noise of {noise:.3g} ± {std:.1g} m/s2 in a reading" if std < _UNCERTAIN * noise else
              f"noise of about {noise:.2g} m/s2 or less in a reading; this drive cannot resolve it")
-    return [f"Learnt from the drive: {shown}", f"Assumed: {rounded}"]
+    return [f"Learned from the drive: {shown}", f"Assumed: {rounded}"]
 
 
 def _unit_hint(found: Assessment) -> str:

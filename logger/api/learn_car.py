@@ -1,4 +1,4 @@
-"""A car that nobody measured, learnt from ordinary drives: answer, words and page."""
+"""A car that nobody measured, learned from ordinary drives: answer, words and page."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ class LearnedVehicle(CommandResult):
     spectra: tuple[Chart, ...]
     comments: str
 
-    title = "A car learnt from its drives"
+    title = "A car learned from its drives"
 
     def charts(self) -> Sequence[Chart]:
         """Measured and modelled spectra by speed, before and after."""
@@ -426,13 +426,13 @@ def _answer(question: LearnCarQuestion, used: Sequence[_Used], problem: UnknownC
             Lines([*_kept_lines(errors), _mass_line(question, mass), *_warnings(problem, car, values, deviations),
                    *missing, *unknown, *moved, *misfits])])
     comments = "".join(f"# {line}\n".replace("# \n", "#\n") for line in [
-        f"Learnt by ridelog learn-car from {len(used)} drives, {seconds / 60:.0f} min.", *str(content).split("\n")])
+        f"Learned by ridelog learn-car from {len(used)} drives, {seconds / 60:.0f} min.", *str(content).split("\n")])
     return LearnedVehicle(content, as_json, model, values, deviations, now, ever,
                           tuple(_charts(problem, car)), comments)
 
 
 def _unseen_errors(knowledge: CarKnowledge, unseen: Sequence[tuple[DriveSpectra, LearnedCar]]) -> dict[str, Any]:
-    """How far drives are from any car of this wheelbase, and from the one that was learnt from the others."""
+    """How far drives are from any car of this wheelbase, and from the one that was learned from the others."""
     found = [[misfit(UnknownCar(spectra, knowledge), x) for x in (knowledge.mean, rest.x)] for spectra, rest in unseen]
     before, after = np.sqrt(np.mean(np.square(found), axis=0)).tolist() if found else (None, None)
     return {"drives": len(found), "misfit_before": before, "misfit_after": after}
@@ -473,9 +473,9 @@ def _table(values: Mapping[str, float], deviations: Mapping[str, float]) -> Tabl
 
 def _kept_lines(errors: Mapping[str, Any]) -> Iterator[str]:
     if not errors["drives"]:
-        yield "Only one drive: give another, so that each can check the car learnt from the other."
+        yield "Only one drive: give another, so that each can check the car learned from the other."
         return
-    yield ("Check: each drive in turn is compared with the car learnt from the others. The misfit of its spectra is "
+    yield ("Check: each drive in turn is compared with the car learned from the others. The misfit of its spectra is "
            f"{errors['misfit_after']:.1f} times that of chance (ideal: 1), and {errors['misfit_before']:.1f} times for "
            "the average car of this wheelbase.")
 
@@ -518,7 +518,7 @@ def _not_identifiable(problem: UnknownCar, car: LearnedCar) -> Iterator[str]:
 
 
 def _changes(question: LearnCarQuestion, car: LearnedCar) -> Iterator[str]:
-    """What has changed since another file was learnt."""
+    """What has changed since another file was learned."""
     assert question.compare is not None
     before = read_vehicle(question.compare)
     try:

@@ -115,7 +115,7 @@ class PassesQuestion(LogsQuestion):
     changes over minutes. Streets some 15 m apart or more are distinguished, lanes of one direction are not. The
     standard error of a mean includes the errors that all windows of one drive share (the car, its tires, its load),
     estimated from how drives differ. An error that all drives share, such as a wrong vehicle file, does not show in
-    these differences; the standard errors of the vehicle file and of the learnt noise account for it.
+    these differences; the standard errors of the vehicle file and of the learned noise account for it.
 
     In Python: raises BadInput for no log, and none with an intact row that counts.
 

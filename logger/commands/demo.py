@@ -114,15 +114,15 @@ def car(out: Path, unpack_only: bool, as_json: bool) -> None:
         write_run(folder, replace(drive, profile=None))
     assert true.vehicle.rear is not None
     wheelbase_m = true.vehicle.front.cg_distance_m + true.vehicle.rear.cg_distance_m
-    learnt = out / "mycar.yaml"
-    words = [*map(str, folders), "--wheelbase", f"{wheelbase_m:.2f}", "--out", str(learnt), "--out",
-             str(learnt.with_suffix(".html"))]
+    learned = out / "mycar.yaml"
+    words = [*map(str, folders), "--wheelbase", f"{wheelbase_m:.2f}", "--out", str(learned), "--out",
+             str(learned.with_suffix(".html"))]
     _typed_for(_UNMEASURED, "learn-car", words, {"runs": list(map(str, folders)), "wheelbase_m": wheelbase_m}
                if unpack_only else None, as_json)
     if unpack_only:
         return
     if not as_json:
-        was, found = (np.exp(coordinates_of(one.vehicle)) for one in (true, read_vehicle(learnt)))
+        was, found = (np.exp(coordinates_of(one.vehicle)) for one in (true, read_vehicle(learned)))
         rows = [(name, f"{was[at]:.3f}", f"{found[at]:.3f}") for at, name in enumerate(NUMBERS)
                 if name.endswith(("_hz", "damping_ratio"))]
         head = ["", "True values of the simulated car:", ""]

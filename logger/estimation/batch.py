@@ -141,7 +141,7 @@ def estimated(
     ), road_profile(pieces)
 
 
-def learnt_noise(
+def learned_noise(
     car: KnownCar, sensor: Sensor, window_m: float, reading_mps2: Array, distance_m: Array
 ) -> NoiseBelief | None:
     """The noise of a sensor, of which ``sensor`` holds a guess, by a drive as ``estimated`` takes it; None where the
@@ -396,8 +396,8 @@ class Assessment:
     exact_m_per_km          (w,) IRI of the profile in each window, NaN where it has none
     compared                whether there is a profile to compare with
     least_error_m_per_km    (w,) r.m.s. error of the best possible values
-    noise                   of a reading before rounding, where it was learnt from the drive; ``sensor`` has it
-    learns_noise            whether that was to be learnt
+    noise                   of a reading before rounding, where it was learned from the drive; ``sensor`` has it
+    learns_noise            whether that was to be learned
     road_effects            names of the effects that make the road that is compared with out of its profile
     """
 
@@ -425,7 +425,7 @@ def assess(
     effects, errors    of the vehicle, and how far its numbers may be off; where an effect is of the road, the track is
                        a profile that differs from the road, and this is what is compared with
 
-    Where the noise is to be learnt, the sensor's is a guess. ValueError if the vehicle lacks what its model or an
+    Where the noise is to be learned, the sensor's is a guess. ValueError if the vehicle lacks what its model or an
     effect needs.
     """
     composed = compose(vehicle, effects)
@@ -435,7 +435,7 @@ def assess(
     noise = None
     noise_log_std = 0.0
     if learns_noise:
-        noise = learnt_noise(car, gridded, window_m, readings, distance_m)
+        noise = learned_noise(car, gridded, window_m, readings, distance_m)
     if noise is not None:
         gridded, noise_log_std = Sensor(noise.noise_rms_mps2, gridded.step_mps2), noise.log_std
         noise = noise.scaled((drive.rate_hz / RATE_HZ) ** 0.5)

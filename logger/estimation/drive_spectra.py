@@ -42,7 +42,7 @@ _WIDENING = 0.06  # of a band above 4 Hz, as a share: a tenth of the width of a 
 _FINE = 2  # points of the model's spectrum for each bin: the window's autocorrelation is as long as two blocks
 _AT_ONCE = 256
 DRIVE_SPECTRA = "drive_spectra"
-"""In a sidecar: what is kept of the drives of a session so that their car can be learnt of them."""
+"""In a sidecar: what is kept of the drives of a session so that their car can be learned of them."""
 MOST_KEPT = 256
 """Blocks of a drive in its sidecar: some 8 kB. Nine minutes of steady driving know a car to a few per cent."""
 _FORM, _FLOOR = 1, 1e-8  # of what is kept; the least power [m2/s4 per Hz], 25 dB below the noise of the finest sensor

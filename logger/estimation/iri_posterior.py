@@ -110,7 +110,7 @@ def slope_knowledge(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, 
 
 def _vehicle_std(car: CarResponse, speed_mps: float, weight: Array) -> float:
     """A gain that is off by a share dH / H makes the wave that is found off by as much, as far as the readings tell
-    it; the road's level is learnt from those waves, so that what they do not tell goes with them."""
+    it; the road's level is learned from those waves, so that what they do not tell goes with them."""
     if car.is_exact:
         return 0.0
     return float(np.linalg.norm(car.changes(speed_mps).real @ weight)) / float(weight.sum())

@@ -1,4 +1,4 @@
-"""How late a receiver's fixes are, learnt from braking and accelerating.
+"""How late a receiver's fixes are, learned from braking and accelerating.
 
 Problem: an accelerometer feels the car brake at once; the receiver's speed shows it later, by an unknown 0.05 to 0.3 s.
 Which way the sensor points is not known either, the receiver's speed has noise, and the sensor takes a hill for
@@ -23,7 +23,7 @@ The noise is not as assumed, so the error is also taken from what happens when a
 (jackknife [3]); the larger one counts. The strengths of B and e are chosen out of ``STRENGTHS`` by likelihood, as
 blocks come.
 
-What is learnt is the delay of the *speed* against the accelerometer as it is read, with the low-pass of its chip: what
+What is learned is the delay of the *speed* against the accelerometer as it is read, with the low-pass of its chip: what
 puts both on one clock. ``FLOOR_S`` is for what no fit shows: the car's body pitches late when it brakes, and the sensor
 with it (0.005 s too little in simulated cars that pitch by 4 degrees per g).
 
@@ -137,7 +137,7 @@ class CarriedDelay:
 
 
 UNKNOWN = CarriedDelay(0.14, 0.07)
-"""Before anything was learnt: receivers are late by 0.05 to 0.3 s. Mean and deviation of what is as likely from each
+"""Before anything was learned: receivers are late by 0.05 to 0.3 s. Mean and deviation of what is as likely from each
 value to twice that."""
 
 
@@ -356,10 +356,10 @@ def _profile(a: Array, b: Array, gravity: Array) -> tuple[Array, Array]:
     return np.sum(upright * y, axis=1), y @ level.T
 
 
-def _best(a: Array, b: Array, gravity: Array, is_learnt: bool) -> tuple[int, Array]:
+def _best(a: Array, b: Array, gravity: Array, is_learned: bool) -> tuple[int, Array]:
     """Index of the best delay and its w; while little has been driven, of a usual delay."""
     explained, w = _profile(a, b, gravity)
-    index = int(np.argmax(explained)) if is_learnt else int(np.argmin(np.abs(DELAYS_S - UNKNOWN.delay_s)))
+    index = int(np.argmax(explained)) if is_learned else int(np.argmin(np.abs(DELAYS_S - UNKNOWN.delay_s)))
     return index, w[index]
 
 

@@ -3,7 +3,7 @@
 A block cannot be solved without the road's spectrum, its roughness from place to place, the noise, and what coarse
 readings tell; none of them is known before it is solved. So each block is solved with what the one before it led to,
 in a few steps from where that one ended, and the belief follows. The first block has none before it: it gets more
-rounds. Where readings are bounds, they move with the road's level: how, is learnt on the way (``level_response``).
+rounds. Where readings are bounds, they move with the road's level: how, is learned on the way (``level_response``).
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ from logger.estimation.quantisation import (
     without_own,
 )
 from logger.estimation.road_solver import Block, Solution
-from logger.estimation.road_spectrum import COMMON_ROAD, RoadSpectrum, learnt
+from logger.estimation.road_spectrum import COMMON_ROAD, RoadSpectrum, learned
 from logger.estimation.roughness import RoadLevels, mean_resolved
 from logger.estimation.scored_variances import ScoredVariances
 from logger.estimation.sensor_noise import (
@@ -58,8 +58,8 @@ _LEAST_SHOWN = 1e-3
 _SMOOTHEST_SOLVED = -6.0  # an IRI of 0.12: a bump on a smoother road takes more steps of the solver
 _SETTLED_SAMPLES = 1000  # behind those that show the noise: their bounds have gone through ten rounds by then
 _MOST_STEPS_PARKED = 8  # more is no stand: somebody works at the car, or the sensor is loose
-# Solved with no less where the noise is learnt: what readings say of a smaller one misleads. For 0.15 m/s2 at 8 g R2 is
-# 0.20 with none, 0.72 with this, 0.70 with 0.07; for 0.05 m/s2 at 4 g 0.73 with this, 0.62 with 0.07. Others agree.
+# Solved with no less where the noise is learned: what readings say of a smaller one misleads. For 0.15 m/s2 at 8 g R2
+# is 0.20 with none, 0.72 with this, 0.70 with 0.07; for 0.05 m/s2 at 4 g 0.73 with this, 0.62 with 0.07. Others agree.
 _LEAST_SHARE_OF_STEP = 0.05
 # Where readings toggle between two steps, twice the noise and twice the ride look alike. By how much more a ride is
 # found if more noise is believed, as a share of it, and how many readings of a block on other steps halve that: chosen
@@ -96,7 +96,7 @@ class FollowedRoad:
 
     sensor           of single readings, of which there may be several per sample: y of t samples
     vehicle_error    share that each axle's gain may be off, because no file fits a car
-    noise            what is believed of the sensor's noise, which is then learnt; None: the sensor's is right, but
+    noise            what is believed of the sensor's noise, which is then learned; None: the sensor's is right, but
     noise_log_std    for this standard error of its logarithm
     """
 
@@ -106,7 +106,7 @@ class FollowedRoad:
     ) -> None:
         self._vehicle_error, self._noise_log_std = vehicle_error, noise_log_std
         self._is_coarse, self._step_mps2 = sensor.is_coarse, sensor.step_mps2
-        # What bounds say already counts what was in a reading before it was rounded. Not where the noise is learnt of
+        # What bounds say already counts what was in a reading before it was rounded. Not where the noise is learned of
         # them: what is left of it would come out too small (a drive of 70 s: 0.03 for 0.1 m/s2).
         self._bounds_with_all = self._is_coarse and noise is None
         self._sensor = sensor
@@ -155,12 +155,12 @@ class FollowedRoad:
 
     @property
     def noise_stretches(self) -> int:
-        """From how many stretches the noise was learnt."""
+        """From how many stretches the noise was learned."""
         return 0 if self._learner is None else self._learner.stretches
 
     @property
     def noise(self) -> NoiseBelief | None:
-        """What is believed of the sensor's noise now; None where it is not learnt."""
+        """What is believed of the sensor's noise now; None where it is not learned."""
         if self._learner is None:
             return None
         belief = self._learner.belief
@@ -178,7 +178,7 @@ class FollowedRoad:
         return self._like_noise * self.noise_log_std
 
     def _take_over(self) -> None:
-        """Go on with the noise that was learnt. Where it blurs the steps, rounding is in it."""
+        """Go on with the noise that was learned. Where it blurs the steps, rounding is in it."""
         assert self._learner is not None
         noise_mps2, before = self._learner.belief.noise_rms_mps2, self._sensor.variance_mps2_2
         if self._is_coarse:
@@ -340,7 +340,7 @@ class FollowedRoad:
             white = np.clip(solution.innovations / np.sqrt(local), -most, most)
             power = np.abs(np.fft.rfft(white)) ** 2 / block.count
             # The level goes with the roughness along the block: two that follow the same slope would overshoot.
-            now = learnt(now, power, resolved, block.log_waves, seen_share, before)
+            now = learned(now, power, resolved, block.log_waves, seen_share, before)
         innovations, gain = exp(0.5 * above_common) * solution.innovations, exp(-above_common) * gain
         self._roughness.learn(first, innovations, log_variance, gain, seen, sharper=ratio, free=free,
                               learns=learns and is_last and before is not None)
@@ -391,7 +391,7 @@ class FollowedRoad:
         usable: Bools | None
     ) -> GaussianReadings:
         """Another round for the bounds, with the variance (y,) that all other readings leave of each acceleration; the
-        readings that are ``read`` (y,) count. The noise is learnt of those that are ``usable`` (y,), if any."""
+        readings that are ``read`` (y,) count. The noise is learned of those that are ``usable`` (y,), if any."""
         low, high = bounds(samples.reading_mps2.ravel(), samples.at_end.ravel(), self._sensor.step_mps2)
         others = others + unexplained(solution.fitted_mps2[read], low[read], high[read], self._noise_variance)
         fitted_variance = 1 / (1 / others + 1 / readings.variance)

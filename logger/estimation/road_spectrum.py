@@ -1,7 +1,7 @@
 """Prior spectrum of a road, by two numbers, and how a stretch tells them.
 
 A road of ISO 8608 has Gd(n) = Gd(n0) (n / n0)^-w; its increments are white noise when the waviness w is 2. Level
-and waviness are learnt on the way, so they are kept where they can be separated: the level at a wave number in the
+and waviness are learned on the way, so they are kept where they can be separated: the level at a wave number in the
 middle of those that shake a car.
 """
 
@@ -64,7 +64,7 @@ def log_waves(wave_number_cpm: Array) -> Array:
 COMMON_ROAD = RoadSpectrum.of_iri(2.5)
 
 
-def learnt(
+def learned(
     now: RoadSpectrum, power: Array, resolved: Array, log_waves: Array, seen_share: float, before: RoadSpectrum | None
 ) -> RoadSpectrum:
     """One scoring step for level and waviness.

@@ -1,4 +1,4 @@
-"""Roughness as a process along the road, learnt on the way: how rough each place is.
+"""Roughness as a process along the road, learned on the way: how rough each place is.
 
 Problem. A road has holes and joints of a metre, patches of ten and sections of a hundred and more, and its level may
 change in a step. One level for a block of 20 s leaks a rough section into the smooth one behind it; a variance that
@@ -16,7 +16,7 @@ Newton step per round finds the most probable L (Laplace's approximation); w fol
 / (common + r), sums over neighbours. Readings tell the mean variance of places that they do not resolve, for they feel
 many at once: L is its logarithm there, half the variance of log w above the mean logarithm. Of places that they resolve
 L is that of the mean precision, as much below. What was found of cells that no block shows any more is carried by a
-Kalman filter, for such processes are Markov's. Their variances are learnt by scoring in the evidence.
+Kalman filter, for such processes are Markov's. Their variances are learned by scoring in the evidence.
 """
 
 from __future__ import annotations
@@ -117,7 +117,7 @@ class RoadLevels:
 
     @property
     def variances(self) -> Array:
-        """Of L, what each process of ``LENGTHS_M`` makes of it, as learnt."""
+        """Of L, what each process of ``LENGTHS_M`` makes of it, as learned."""
         return np.append(self._scored.values, COMMON_DEVIATIONS[0] ** 2)
 
     def held_at(self, log_variance: Array) -> RoadLevels:
@@ -151,7 +151,7 @@ class RoadLevels:
         return float(np.sqrt(max(error, 0.0)))
 
     def _kept(self, row: Array, first: int, count: int) -> Array:
-        """Part of a row by points as they were learnt; 0 elsewhere."""
+        """Part of a row by points as they were learned; 0 elsewhere."""
         found, ahead = np.zeros(count), first - self._first
         here = slice(max(-ahead, 0), max(min(len(row) - ahead, count), 0))
         found[here] = row[max(ahead, 0): max(min(len(row), ahead + count), 0)]

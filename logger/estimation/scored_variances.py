@@ -16,7 +16,7 @@ LARGEST_STEP = 0.7
 class ScoredVariances:
     """Variances (k,), of which only their ``common`` values are known before, but for ``log_std`` of their logarithms.
 
-    values    as learnt
+    values    as learned
     """
 
     def __init__(self, common: Array, log_std: float) -> None:

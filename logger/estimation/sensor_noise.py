@@ -33,7 +33,7 @@ from logger.estimation.normal_distribution import probability_between
 from logger.estimation.scored_variances import LARGEST_STEP
 
 NOISE_MPS2 = 0.05
-"""Of a reading, where nobody says another [m/s2]; where it is to be learnt, a guess to begin with."""
+"""Of a reading, where nobody says another [m/s2]; where it is to be learned, a guess to begin with."""
 UNKNOWN_LOG_STD = 1.0
 """Of a noise that was only guessed: by a factor of e up or down."""
 # However long the drive: what road and car do that the model does not know, and how rough the propagation is where the
@@ -41,7 +41,7 @@ UNKNOWN_LOG_STD = 1.0
 _MODEL_LOG_STD, _ROUGH_LOG_STD = 0.04, 5e-4
 _WANDERED_LOG_STD = 0.05  # from drive to drive: temperature, supply
 _FORGOTTEN_PER_STRETCH = 0.005
-_FORGOTTEN_PER_LOG = 5.0  # what was learnt of another noise is no longer quite true of this one
+_FORGOTTEN_PER_LOG = 5.0  # what was learned of another noise is no longer quite true of this one
 _LEAST_SHARE = 0.05
 _EXPECTED_STRETCHES = 4.0  # count as having scattered as they should
 _SPACING, _REACH = 0.1, 35  # of the grid in the log noise: a factor of 33 up and down

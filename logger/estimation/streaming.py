@@ -1,6 +1,6 @@
 """Streaming estimation of the road and its IRI while the car drives: blocks of readings, a few seconds behind.
 
-A block of 20 s is solved every 2 s (``road_solver``), with what was learnt of road and sensor so far
+A block of 20 s is solved every 2 s (``road_solver``), with what was learned of road and sensor so far
 (``recursive_road``). A stretch of road is taken from it once the car is ``LAG_S`` past it, because the rear axle, and
 the body's slow swing, still depend on a road already driven; windows longer than 10 m are made of several stretches.
 Splitting the readings differently changes nothing.
@@ -125,7 +125,7 @@ class RoadEstimator:
                  lift one axle while the other sinks from being made too much of
     on_road      is given each piece of estimated road
     late_std_s   standard error of the delay by which the distance is late: the faster, the further off
-    noise        what is believed of the sensor's noise before, which is then learnt; None: the sensor's is right
+    noise        what is believed of the sensor's noise before, which is then learned; None: the sensor's is right
     ride_response    of the comfort weighting at frequencies (n,) [Hz], to compute the figures of the ride; None: not
     ride_ahead_m     a window's ride is what was felt with the front axle so far ahead of its place
     off              cars that it may be instead, each a standard error of the vehicle's numbers away, in directions
@@ -133,7 +133,7 @@ class RoadEstimator:
                      cars are like
     driven_share     way that was driven over what the distance says; windows are of that distance
     reads            readings of each sample; more than one only where the sensor is coarse
-    noise_log_std    of a noise that is not learnt: standard error of its logarithm
+    noise_log_std    of a noise that is not learned: standard error of its logarithm
     """
 
     def __init__(
@@ -192,12 +192,12 @@ class RoadEstimator:
 
     @property
     def noise_stretches(self) -> int:
-        """From how many stretches the noise was learnt."""
+        """From how many stretches the noise was learned."""
         return self._road.noise_stretches
 
     @property
     def noise(self) -> NoiseBelief | None:
-        """What is believed of the sensor's noise now; None where it is not learnt."""
+        """What is believed of the sensor's noise now; None where it is not learned."""
         return self._road.noise
 
     def next_drive(self) -> None:

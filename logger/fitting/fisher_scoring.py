@@ -55,7 +55,7 @@ class Maximum(Generic[S]):
 @dataclass(frozen=True, eq=False)
 class _Curvature:
     """What is known of how slopes change: the information taken last, of the numbers that were free to move the
-    ``whitening`` and the ``correction`` (r, r) learnt since, and the step that was taken, in standard errors: the
+    ``whitening`` and the ``correction`` (r, r) learned since, and the step that was taken, in standard errors: the
     slopes before (r,), and itself (r,), 0 where it was cut short."""
 
     information: Array

@@ -531,7 +531,7 @@ def iri_ratio(estimating: Array, actual: Array, speed_mps: float, noise: float, 
     another.
 
     Problem: what a wrong gain does to an IRI is not its mean error, as waves that a car does not feel are filled in by
-    the road's spectrum, whose level is learnt with the same wrong gain. Solution: the estimator's filter (N. Wiener's,
+    the road's spectrum, whose level is learned with the same wrong gain. Solution: the estimator's filter (N. Wiener's,
     with the level that fits the readings' power best) is applied to the spectrum that the other car reads; the IRI is
     proportional to the root of the power of the slope that comes out, the posterior variance included.
 

@@ -108,7 +108,7 @@ def _date(node: Node) -> str:
 class AccelerometerConfig:
     """``driver`` is the name of the accelerometer; ``vertical_axis`` one of ``AXES``: the sensor's axis that points up;
     ``sections`` the settings of each accelerometer by its name, of which only those of ``driver`` are used;
-    ``noise_mps2`` the r.m.s. noise of one reading (``AUTO``: learnt; None, in no settings but those of recordings by
+    ``noise_mps2`` the r.m.s. noise of one reading (``AUTO``: learned; None, in no settings but those of recordings by
     loggers that did not learn it: what is usual of it)."""
 
     driver: str = DEFAULT
@@ -148,9 +148,9 @@ def _accelerometer(node: Node) -> AccelerometerConfig:
 
 @dataclass(frozen=True)
 class GpsConfig:
-    """The receiver's line; its latency (None: as it was learnt), the longest loss that is bridged, 1024-week periods to
-    add, and the date (ISO 8601) before which what it says cannot be true; where its antenna sits, and how far off the
-    places are that it gives from one window to another (standard deviation)."""
+    """The receiver's line; its latency (None: as it was learned), the longest loss that is bridged, 1024-week periods
+    to add, and the date (ISO 8601) before which what it says cannot be true; where its antenna sits, and how far off
+    the places are that it gives from one window to another (standard deviation)."""
 
     port: str = _setting("/dev/serial0", Node.text)
     baud: int = _setting(9600, BAUDS.read)

@@ -138,7 +138,7 @@ class EventCore:
 
     @property
     def utc_known(self) -> bool:
-        """True once UTC has been learnt from the GPS."""
+        """True once UTC has been learned from the GPS."""
         return self._offset_us is not None
 
     @property

@@ -1,9 +1,9 @@
 """What drives taught, from one start of the service to the next: the accelerometer's noise, the receiver's delay.
 
-Problem: nobody states the noise of this very sensor, ``gps.latency_s: auto`` shall mean what was learnt, and a replay
+Problem: nobody states the noise of this very sensor, ``gps.latency_s: auto`` shall mean what was learned, and a replay
 shall make the same rows. Solution: what was known when the service started is in the dump's header and the sidecars.
 From there on the pipeline learns the noise from the readings themselves, in a replay as on board; of the delay what was
-known counts until the service ends. What is learnt goes into a small file in the folder of the logs, for the next
+known counts until the service ends. What is learned goes into a small file in the folder of the logs, for the next
 start: the noise with what the sensor was set to, as of another range it says nothing.
 
 The file is written every few minutes, as a car cuts the power. One that cannot be read is as none, and one that cannot
@@ -47,15 +47,15 @@ Known = TypeVar("Known")
 
 @dataclass(frozen=True)
 class KnownNoise:
-    """What is believed of the noise of a reading, over how many drives it was learnt."""
+    """What is believed of the noise of a reading, over how many drives it was learned."""
 
     belief: NoiseBelief
     drives: int = 0
 
 
 @dataclass(frozen=True)
-class LearntQuantity(Generic[Known]):
-    """One thing that is learnt.
+class LearnedQuantity(Generic[Known]):
+    """One thing that is learned.
 
     what          it is, for messages: "the receiver's delay"
     keys          of its value, its standard error and the number of drives; nothing is said where ``key`` is not there
@@ -105,15 +105,16 @@ class LearntQuantity(Generic[Known]):
         except FileNotFoundError:
             return None
         except (OSError, ValueError, TypeError, RecursionError) as error:
-            logger.warning("%s: what was learnt of %s cannot be read, it is learnt again (%s)", path, self.what, error)
+            logger.warning("%s: what was learned of %s cannot be read, it is learned again (%s)", path, self.what,
+                           error)
             return None
 
 
-NOISE = LearntQuantity("sensor-noise", "the sensor's noise", ("noise_mps2", "noise_std_mps2", "noise_drives"),
+NOISE = LearnedQuantity("sensor-noise", "the sensor's noise", ("noise_mps2", "noise_std_mps2", "noise_drives"),
                        "noise_std_mps2", LEAST_NOISE_MPS2, MOST_NOISE_MPS2, LEAST_STD_SHARE,
                        lambda known: (known.belief.noise_rms_mps2, known.belief.std_mps2, known.drives),
                        lambda noise, std, drives: KnownNoise(NoiseBelief(log(noise), std / noise), drives))
-DELAY = LearntQuantity(
+DELAY = LearnedQuantity(
     "receiver-delay", "the receiver's delay", ("latency_s", "latency_std_s", "latency_drives"), "latency_s",
     0.0, MOST_DELAY_S, 0.0, lambda known: (known.delay_s, known.std_s, known.drives), CarriedDelay)
 
@@ -125,7 +126,7 @@ class CarriedLearning(Generic[Known]):
     saved    what is in the file already
     """
 
-    def __init__(self, quantity: LearntQuantity[Known], folder: Path, known: Known | None, files: FileSystem | None,
+    def __init__(self, quantity: LearnedQuantity[Known], folder: Path, known: Known | None, files: FileSystem | None,
                  saved: Mapping[str, Any] | None = None) -> None:
         self._quantity, self._path, self._known = quantity, folder / quantity.file_name, known
         self._files = files or FileSystem()
@@ -135,7 +136,7 @@ class CarriedLearning(Generic[Known]):
 
     @property
     def now(self) -> Known | None:
-        """What is known by now, with this session; None: nothing yet, or it is not to be learnt."""
+        """What is known by now, with this session; None: nothing yet, or it is not to be learned."""
         raise NotImplementedError
 
     def tend(self, now_us: int) -> None:
@@ -147,7 +148,7 @@ class CarriedLearning(Generic[Known]):
             self.save()
 
     def save(self) -> None:
-        """Put what is learnt into its file, whole, if it is new."""
+        """Put what is learned into its file, whole, if it is new."""
         now = self.now
         fields = {**self._quantity.fields(now), **self._beside()}
         if now is None or now is self._known or fields == self._saved:
@@ -157,7 +158,7 @@ class CarriedLearning(Generic[Known]):
             self._saved, self._failed = fields, False
         except OSError as error:
             if not self._failed:
-                logger.warning("%s: what was learnt of %s cannot be written: %s", self._path, self._quantity.what,
+                logger.warning("%s: what was learned of %s cannot be written: %s", self._path, self._quantity.what,
                                error.strerror)
             self._failed = True
 
@@ -172,10 +173,10 @@ def read_noise(folder: Path, config: AccelerometerConfig) -> KnownNoise | None:
 
 
 def noise_at_start(folder: Path, config: AccelerometerConfig) -> KnownNoise | None:
-    """What a session begins with, where the noise is to be learnt: what earlier drives left in the folder, a little
-    less certain than it was then. None: nothing is known, or it is not to be learnt."""
-    learnt = read_noise(folder, config) if config.noise_mps2 == AUTO else None
-    return learnt and KnownNoise(learnt.belief.next_drive(), learnt.drives)
+    """What a session begins with, where the noise is to be learned: what earlier drives left in the folder, a little
+    less certain than it was then. None: nothing is known, or it is not to be learned."""
+    learned = read_noise(folder, config) if config.noise_mps2 == AUTO else None
+    return learned and KnownNoise(learned.belief.next_drive(), learned.drives)
 
 
 def _identity(config: AccelerometerConfig) -> dict[str, Any]:
@@ -196,7 +197,7 @@ class NoiseLearning(CarriedLearning[KnownNoise]):
 
     @property
     def now(self) -> KnownNoise | None:
-        """What is known by now, with this session; None: nothing yet, or it is not to be learnt."""
+        """What is known by now, with this session; None: nothing yet, or it is not to be learned."""
         belief = self._pipeline.noise
         if belief is None or not self._pipeline.noise_stretches:
             return self._known
@@ -206,7 +207,7 @@ class NoiseLearning(CarriedLearning[KnownNoise]):
         return {_OF: _identity(self._config)}
 
     def fields(self) -> dict[str, Any]:
-        """The same for a program: noise and standard error in m/s2, None where they are not learnt."""
+        """The same for a program: noise and standard error in m/s2, None where they are not learned."""
         return NOISE.fields(self.now)
 
     def words(self) -> str:
@@ -216,16 +217,16 @@ class NoiseLearning(CarriedLearning[KnownNoise]):
             return f"{noise:.3g} m/s2 by the settings"
         if now is None:
             usual = self._config.kind.readings(self._config.settings).noise_mps2
-            return f"{usual:.2g} m/s2 assumed{'; it is learnt while driving' if noise == AUTO else ''}"
-        return (f"{now.belief.noise_rms_mps2:.2g} ± {now.belief.std_mps2:.1g} m/s2, learnt over "
+            return f"{usual:.2g} m/s2 assumed{'; it is learned while driving' if noise == AUTO else ''}"
+        return (f"{now.belief.noise_rms_mps2:.2g} ± {now.belief.std_mps2:.1g} m/s2, learned over "
                 f"{counted(now.drives, 'drive')}")
 
 
-def delay_at_start(gps: GpsConfig, learnt: CarriedDelay | None) -> CarriedDelay:
-    """What a session goes by: the number in the settings, else what was learnt, else what is usual."""
+def delay_at_start(gps: GpsConfig, learned: CarriedDelay | None) -> CarriedDelay:
+    """What a session goes by: the number in the settings, else what was learned, else what is usual."""
     if gps.latency_s is not None:
         return CarriedDelay(gps.latency_s, 0.0)
-    return learnt or UNKNOWN
+    return learned or UNKNOWN
 
 
 def is_loggers(fields: Mapping[str, Any]) -> bool:
@@ -235,40 +236,40 @@ def is_loggers(fields: Mapping[str, Any]) -> bool:
 
 def read_delay(folder: Path) -> CarriedDelay | None:
     """What earlier drives left; None where there is nothing that can be read."""
-    learnt = DELAY.read(folder)
-    return learnt if learnt is not None and learnt.std_s > 0 else None
+    learned = DELAY.read(folder)
+    return learned if learned is not None and learned.std_s > 0 else None
 
 
 class ReceiverLearning(CarriedLearning[CarriedDelay]):
     """Of the receiver's delay.
 
     known     what the session goes by
-    learnt    what earlier drives left, also where the settings say a number
+    learned    what earlier drives left, also where the settings say a number
     """
 
-    def __init__(self, folder: Path, alignment: DriveAlignment, known: CarriedDelay, learnt: CarriedDelay | None,
+    def __init__(self, folder: Path, alignment: DriveAlignment, known: CarriedDelay, learned: CarriedDelay | None,
                  files: FileSystem | None = None) -> None:
-        super().__init__(DELAY, folder, known, files, DELAY.fields(learnt) if learnt else None)
-        self._alignment, self._learnt, self.known = alignment, learnt, known
+        super().__init__(DELAY, folder, known, files, DELAY.fields(learned) if learned else None)
+        self._alignment, self._learned, self.known = alignment, learned, known
 
     @property
     def now(self) -> CarriedDelay | None:
-        """What is learnt by now, with this session; None: nothing yet."""
-        now = combined(self._learnt or UNKNOWN, self._alignment.estimate())
+        """What is learned by now, with this session; None: nothing yet."""
+        now = combined(self._learned or UNKNOWN, self._alignment.estimate())
         # An accelerometer behind a low-pass may be the later of the two, by an error or so.
         return replace(now, delay_s=max(0.0, now.delay_s)) if now.drives else None
 
     @property
     def shown(self) -> CarriedDelay:
-        """The best that is known: a number in the settings, what is learnt by now, or what is usual."""
+        """The best that is known: a number in the settings, what is learned by now, or what is usual."""
         return self.known if self.known.std_s == 0.0 else self.now or self.known
 
     def words(self) -> str:
         """One line for ``ridelog status``."""
         now, known = self.now, self.known
         if known.std_s == 0.0:
-            learnt = f", {_belief_words(now)}" if now is not None else ""
-            return f"{known.delay_s:.2f} s by the settings{learnt}"
+            learned = f", {_belief_words(now)}" if now is not None else ""
+            return f"{known.delay_s:.2f} s by the settings{learned}"
         if now is not None:
             later = "" if known.drives else "; from the next start on"
             return f"{_belief_words(now)}{later}"
@@ -285,7 +286,7 @@ class ReceiverLearning(CarriedLearning[CarriedDelay]):
 
 
 def _belief_words(belief: CarriedDelay) -> str:
-    return f"{belief.delay_s:.2f} ± {belief.std_s:.2f} s, learnt over {counted(belief.drives, 'drive')}"
+    return f"{belief.delay_s:.2f} ± {belief.std_s:.2f} s, learned over {counted(belief.drives, 'drive')}"
 
 
 def drive_fields(alignment: DriveAlignment, config: AccelerometerConfig) -> dict[str, Any]:

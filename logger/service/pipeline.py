@@ -174,12 +174,12 @@ class Pipeline(JudgedDrive):
 
     @property
     def noise(self) -> NoiseBelief | None:
-        """What is believed of the accelerometer's noise now; None where it is not learnt."""
+        """What is believed of the accelerometer's noise now; None where it is not learned."""
         return self._estimator.noise
 
     @property
     def noise_stretches(self) -> int:
-        """From how many stretches of road that was learnt."""
+        """From how many stretches of road that was learned."""
         return self._estimator.noise_stretches
 
     def step(self, now_us: int, block: AccelerationBlock, fixes: list[Fix]) -> list[WindowRecord]:

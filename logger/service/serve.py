@@ -267,8 +267,8 @@ def _serve(config: Config, stop: Stop) -> None:
     noise = noise_at_start(config.log.directory, config.accelerometer)
     sensor = wiring.instrument(config.accelerometer, noise)
     model = wiring.car_of(config)
-    learnt = read_delay(config.log.directory)
-    receiver_delay = delay_at_start(config.gps, learnt)
+    learned = read_delay(config.log.directory)
+    receiver_delay = delay_at_start(config.gps, learned)
     facts = wiring.sidecar(config, sensor, model, receiver_delay, noise)
     header = wiring.dump_header(config, receiver_delay, noise) if config.log.record_dump else None
     limits = QuotaLimits(config.log.quota_bytes, config.log.keep_free_bytes)
@@ -276,7 +276,7 @@ def _serve(config: Config, stop: Stop) -> None:
     storage = Storage(config.log.directory, facts, config.log.max_file_bytes, header, limits, monotonic_us,
                       pairing=config.pairing, more=pipeline.sidecar)
     decoder = wiring.gps_decoder(config)
-    delay_learning = ReceiverLearning(config.log.directory, pipeline.alignment, receiver_delay, learnt)
+    delay_learning = ReceiverLearning(config.log.directory, pipeline.alignment, receiver_delay, learned)
     sensor_learning = NoiseLearning(config.log.directory, pipeline, config.accelerometer, noise)
     core = EventCore(sensor.decoder, decoder, pipeline, storage.log)
     events: deque[Event] = deque()

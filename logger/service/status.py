@@ -99,7 +99,7 @@ class ServiceStatus:
     receiver_delay  how late fixes come, and how that is known; empty: not known; receiver_delay_s and
                     receiver_delay_std_s: as numbers, with the standard error [s]
     sensor_noise    of the accelerometer, and how that is known, likewise; sensor_noise_mps2 and
-                    sensor_noise_std_mps2: as numbers where it was learnt [m/s2]
+                    sensor_noise_std_mps2: as numbers where it was learned [m/s2]
     """
 
     state: ServiceState

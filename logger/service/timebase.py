@@ -20,8 +20,8 @@ class Rhythm:
     """usual_us   interval between two of its times [us]; None: not known yet
 
     Problem: one fix a second is usual, but receivers send from ten times a second to once in five seconds, and one that
-    sends each two seconds has lost nothing between two of its fixes. Solution: the rhythm is learnt as it comes. Losses
-    make intervals longer, never shorter, so it is the lower quartile of the last ones.
+    sends each two seconds has lost nothing between two of its fixes. Solution: the rhythm is learned as it comes.
+    Losses make intervals longer, never shorter, so it is the lower quartile of the last ones.
     """
 
     def __init__(self) -> None:

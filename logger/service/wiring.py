@@ -111,7 +111,7 @@ class Instrument:
 def instrument(config: AccelerometerConfig, known: KnownNoise | None = None) -> Instrument:
     """Decoder and description of the configured accelerometer. Raises SettingsError for what it cannot be.
 
-    known    what earlier drives showed of its noise, where it is to be learnt; None: nothing
+    known    what earlier drives showed of its noise, where it is to be learned; None: nothing
     """
     kind, settings = config.kind, config.settings
     readings = kind.readings(settings)
@@ -326,14 +326,14 @@ def receiver_for_dump(header: DumpHeader, config: Config, place: str = "header")
 
 
 def noise_for_dump(header: DumpHeader, config: Config, place: str = "header") -> KnownNoise | None:
-    """What was known of the sensor's noise when the recording began, where the settings want it learnt; None: nothing.
+    """What was known of the sensor's noise when the recording began, where the settings want it learned; None: nothing.
     Raises BadInput, beginning with ``place``, where the recording says what cannot be."""
     if config.accelerometer.noise_mps2 != AUTO:
         return None
     said = header.accelerometer.get("noise", {})
     try:
         known = NOISE.from_fields(said)
-        # Recordings by programs that learnt the noise of the mean of several readings say nothing of one.
+        # Recordings by programs that learned the noise of the mean of several readings say nothing of one.
         return known if said.get(_READS, 1) == instrument(config.accelerometer).reads else None
     except ValueError as error:
         raise BadInput(f"{place}: {error}") from None

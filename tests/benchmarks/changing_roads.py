@@ -441,7 +441,7 @@ def main() -> None:
     parser.add_argument("--noise", type=numbers, default=[0.05, 0.147])
     parser.add_argument("--reads", type=numbers, default=[1])
     parser.add_argument("--waviness", type=numbers, default=[2.0])
-    parser.add_argument("--learn", action="store_true", help="the noise is learnt, from a guess of 0.1 m/s2")
+    parser.add_argument("--learn", action="store_true", help="the noise is learned, from a guess of 0.1 m/s2")
     parser.add_argument("--draws", type=int, default=1, help="roads of each kind")
     parser.add_argument("--km", type=float, default=2.4, help="length of a road")
     parser.add_argument("--no-limit", action="store_true")

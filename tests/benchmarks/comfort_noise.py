@@ -138,7 +138,7 @@ def drives(
 ) -> Rows:
     """Four drives, with gravity at another place within a step each.
 
-    reported     the noise that is taken for true; ``learns``: it is learnt
+    reported     the noise that is taken for true; ``learns``: it is learned
     car_off      share by which every number of the car is off its file
     engine_mps2  r.m.s. of a vibration of 25 Hz that no road makes
     """
@@ -239,7 +239,7 @@ def main() -> int:
     for road_class, mph in itertools.product("AB", extent.mph[::2]):
         print_row(f"2 g, 0.15 given 0.1, {road_class} {mph}",
                   drives(0.15, 2, road_class, mph, extent.windows, reported=ASSUMED_MPS2))
-        print_row(f"2 g, 0.15 learnt, {road_class} {mph}",
+        print_row(f"2 g, 0.15 learned, {road_class} {mph}",
                   drives(0.15, 2, road_class, mph, extent.windows, learns=True))
         print_row(f"2 g, 0.1, wrong car, {road_class} {mph}",
                   drives(0.1, 2, road_class, mph, extent.windows, car_off=0.1))

@@ -11,7 +11,7 @@ rows tell:
 exact            no receiver: places as they are, the noise given
 right places     replay, a receiver that does not wander, its delay in the settings
 delay known      replay, the places wander
-default          replay, nothing known: the noise is learnt, the delay is what it is before any drive
+default          replay, nothing known: the noise is learned, the delay is what it is before any drive
 by place alone   the right IRI of where the car was, at the places that the rows tell: what no estimator can make good
 
 Goal: R2 of ``default`` within 0.03 of ``exact`` up to 50 mph, within 0.05 above. Exit 1 when it is missed.

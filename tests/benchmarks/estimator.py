@@ -524,7 +524,7 @@ def wrong(figures: Figures, extent: Extent, sensors: Sequence[Accelerometer] = (
 @dataclass(frozen=True)
 class Logged:
     """What the pipeline said of some windows, and what is true at the place it gave and where the car really was; and
-    what it learnt of the noise."""
+    what it learned of the noise."""
 
     windows: Windows
     where_it_was: Array

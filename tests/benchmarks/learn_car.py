@@ -1,11 +1,11 @@
-"""Cars learnt from drives beside the truth: bias of the IRI by speed, and what the standard errors hold.
+"""Cars learned from drives beside the truth: bias of the IRI by speed, and what the standard errors hold.
 
     python -m tests.benchmarks.learn_car [--cars 0-7] [--minutes 20] [--sensor bma220|fine] [--plain FILE.py] [--town]
         [--missing friction|rebound]
 
 Each car (``support.drives.unmeasured_car.some_car``) is driven over four roads whose level changes, of waviness 1.7 to
 2.5, with potholes; its wheelbase is said 1 % off, its sensor sits 0.3 m ahead of the centre of gravity, its receiver is
-0.1 m/s off. The bias of an IRI is that of an estimator with the learnt car's response on readings of the true one, on
+0.1 m/s off. The bias of an IRI is that of an estimator with the learned car's response on readings of the true one, on
 a road of ISO 8608 (``unknown_car.iri_ratio``), from 10 to 70 mph. ``--plain`` runs a script as
 ``FILE.py RUN... --wheelbase M --noise N --step S --out car.yaml`` on the same drives, for comparison.
 

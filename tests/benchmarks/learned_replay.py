@@ -2,7 +2,7 @@
 
     python -m tests.benchmarks.learned_replay [--cars 0-1] [--mph 25,45] [--km 2.4]
 
-Each car (``support.drives.unmeasured_car.some_car``) is learnt from twenty minutes of ordinary drives, its wheelbase
+Each car (``support.drives.unmeasured_car.some_car``) is learned from twenty minutes of ordinary drives, its wheelbase
 1 % off, with a BMA220. Then it drives on, over roads whose level changes (``changing_roads.sectioned_road``), and
 ``ridelog replay`` reads the recorded bytes with each vehicle: R2, bias, and the windows of 25 ft within one and two
 standard errors. Places are right and the noise is known, and the box is told both: with the metre of its settings the
@@ -69,7 +69,7 @@ def main() -> int:
     parser.add_argument("--km", type=float, default=2.4)
     asked = parser.parse_args()
     low, _, high = asked.cars.partition("-")
-    found: dict[str, list] = {"true": [], "learnt": [], "generic": []}
+    found: dict[str, list] = {"true": [], "learned": [], "generic": []}
     for seed in range(int(low), int(high or low) + 1):
         car = some_car(seed)
         wheelbase_m = car.wheelbase_m * (1 + 0.01 * (-1) ** seed)
@@ -77,9 +77,10 @@ def main() -> int:
         with TemporaryDirectory() as name:
             folder = Path(name)
             runs = written(folder / "drives", mixed(car, 50_000 + seed, 300.0, BMA220))
-            learn_car(runs, wheelbase_m, sensor=ahead_of_middle_m(car)).write(folder / "learnt.yaml")
+            learn_car(runs, wheelbase_m, sensor=ahead_of_middle_m(car)).write(folder / "learned.yaml")
             write_model(folder / "true.yaml", CarModel(true), "")
-            settings = {"true": f"vehicle: {folder / 'true.yaml'}\n", "learnt": f"vehicle: {folder / 'learnt.yaml'}\n",
+            settings = {"true": f"vehicle: {folder / 'true.yaml'}\n",
+                        "learned": f"vehicle: {folder / 'learned.yaml'}\n",
                         "generic": f"vehicle: generic\nwheelbase_m: {wheelbase_m:.3f}\n"}
             for mph in map(float, asked.mph.split(",")):
                 rng = np.random.default_rng([FIRST_SEED, seed, round(mph)])
@@ -98,11 +99,11 @@ def main() -> int:
                     print_way(f"car {seed}, {mph:g} mph, {way}", found[way][-1:])
     figures = Figures()
     r2 = {way: print_way(f"all, {way}", parts) for way, parts in found.items()}
-    figures.at_least("R2 with the learnt car beside the true one", r2["learnt"] - r2["true"], -0.02, "")
-    exact, estimate, std = (np.concatenate([getattr(one, name) for one in found["learnt"]])
+    figures.at_least("R2 with the learned car beside the true one", r2["learned"] - r2["true"], -0.02, "")
+    exact, estimate, std = (np.concatenate([getattr(one, name) for one in found["learned"]])
                             for name in ("exact", "estimate", "std"))
     generic = np.concatenate([generic_deviations(mph) for mph in map(float, asked.mph.split(","))])
-    for way, deviations, ranges in (("learnt: windows", (estimate - exact) / std, ((0.64, 0.72), (0.93, 0.97))),
+    for way, deviations, ranges in (("learned: windows", (estimate - exact) / std, ((0.64, 0.72), (0.93, 0.97))),
                                     ("generic: cars", generic, ((0.6, 0.85), (0.93, 0.99)))):
         for times, (least, most) in enumerate(ranges, 1):
             share = float(np.mean(np.abs(deviations) <= times))

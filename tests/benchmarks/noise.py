@@ -1,11 +1,11 @@
-"""The noise of a BMA220 learnt from drives, and what that is worth: beside an assumed 0.1 m/s2, and the true noise.
+"""The noise of a BMA220 learned from drives, and what that is worth: beside an assumed 0.1 m/s2, and the true noise.
 
     python -m tests.benchmarks.noise [--all] [--only PART] [--reads N] [--results FILE] [--minutes M]
 
 drives: every drive goes through the real pipeline with a receiver of 1 Hz whose position wanders by 0.8 m: noise x
 range x speed x roads of several IRI, with gravity at another place within a step each time. Four times each: with
 an assumed 0.1 m/s2, with the true noise given, learning from a guess ("first drive"), and once
-more with what was learnt carried on ("learnt"). Roads, car and receiver are those of tests/benchmarks/estimator.py.
+more with what was learned carried on ("learned"). Roads, car and receiver are those of tests/benchmarks/estimator.py.
 
 limit: ISO roads with exact places and the noise given, beside the best that anybody could say (``rounding_limit``),
 also where the noise is a tenth of a step. Over the windows that have an estimate; "given" is the share of these.
@@ -21,7 +21,7 @@ through a wider filter.
 
 R2 and bias are of 25 ft windows over the roads of a row; "in 1" and "in 2" the shares of them within one and two of
 their standard errors. A noise counts as found within two of its standard errors. Far below a step only a bound is
-learnt, which says so by its standard error.
+learned, which says so by its standard error.
 
 Goals: the noise found in 95 % of the drives; the bias within 3 % (5 % where the noise is below a fifth of a step) and
 no larger than as assumed, R2 within 0.03 of that with the true noise, and of the limit, coverage within 0.04. Exit 1
@@ -72,7 +72,7 @@ from .rounding_limit import Lap, best_values
 ASSUMED_MPS2 = 0.1
 LATENCY_S = 0.15
 OFFSETS = (0.0, 0.25, 0.5, -0.2)  # of gravity within a step, in steps
-WAYS = ("assumed", "true", "first drive", "learnt")
+WAYS = ("assumed", "true", "first drive", "learned")
 
 
 @dataclass(frozen=True)
@@ -191,7 +191,7 @@ def four_ways(noise: float, range_g: int, mph: int, level: float, windows: int, 
     assert first.noise is not None
     carried = first.noise.next_drive()
     return {"assumed": driven(2 * number + 1, assumed), "true": driven(2 * number + 1, noise),
-            "first drive": first, "learnt": driven(2 * number + 1, assumed, carried)}
+            "first drive": first, "learned": driven(2 * number + 1, assumed, carried)}
 
 
 def figures_of(found: Score) -> str:
@@ -200,7 +200,7 @@ def figures_of(found: Score) -> str:
 
 
 def row(figures: Figures, noise: float, range_g: int, mph: int, extent: Extent) -> tuple[list[Logged], list[float]]:
-    """All levels of one noise, range and speed: the drives that had learnt, and by how many of its standard errors
+    """All levels of one noise, range and speed: the drives that had learned, and by how many of its standard errors
     their noise is off."""
     windows, of_one, noise = extent.windows_at(mph), noise, noise * wider(extent.reads)
 
@@ -213,26 +213,26 @@ def row(figures: Figures, noise: float, range_g: int, mph: int, extent: Extent) 
         return extent.kept.four(key, make) if extent.kept is not None else make()
 
     drives = [drive(number, level) for number, level in enumerate(extent.levels)]
-    learnt = [one["learnt"] for one in drives]
+    learned = [one["learned"] for one in drives]
     scores = {way: score(pooled([one[way].windows for one in drives])) for way in WAYS}
-    beliefs = [one.noise for one in learnt if one.noise is not None]
+    beliefs = [one.noise for one in learned if one.noise is not None]
     off = [(belief.log_mean - log(noise)) / belief.log_std for belief in beliefs]
     name = f"{of_one:g} m/s2, {range_g} g, {mph} mph"
-    print(f"{name:24s} learnt " + " ".join(f"{one.noise_rms_mps2:.3f}+-{one.std_mps2:.3f}" for one in beliefs))
+    print(f"{name:24s} learned " + " ".join(f"{one.noise_rms_mps2:.3f}+-{one.std_mps2:.3f}" for one in beliefs))
     print(f"{'':24s}" + "  ".join(f"{way:>11s}{figures_of(scores[way])}" for way in WAYS), flush=True)
-    found, true, assumed = scores["learnt"], scores["true"], scores["assumed"]
+    found, true, assumed = scores["learned"], scores["true"], scores["assumed"]
     goal_percent = 3.0 if noise >= 0.2 * step_of(range_g) else 5.0
     figures.at_most(f"{name}: size of bias", 100 * abs(found.bias), goal_percent, "%")
     figures.at_most(f"{name}: first drive's, assumed's + 1", 100 * abs(scores["first drive"].bias),
                     100 * abs(assumed.bias) + 1, "%")
     figures.at_least(f"{name}: R2, true noise's less 0.03", found.r2, true.r2 - 0.03, "")
-    return learnt, off
+    return learned, off
 
 
 def drives(figures: Figures, extent: Extent) -> None:
     """Drives with a receiver, four ways each."""
     print(f"each way: R2, bias, in 1, in 2; roads of IRI {', '.join(f'{level:g}' for level in extent.levels)}")
-    learnt: list[Logged] = []
+    learned: list[Logged] = []
     off: list[float] = []
     by_range: dict[int, list[Logged]] = {}
     for number, (range_g, noise, mph) in enumerate(extent.rows):
@@ -240,7 +240,7 @@ def drives(figures: Figures, extent: Extent) -> None:
             print(f"{number} of {len(extent.rows)} rows in the time given")
             break
         row_drives, deviations = row(figures, noise, range_g, mph, extent)
-        learnt += row_drives
+        learned += row_drives
         by_range.setdefault(range_g, []).extend(row_drives)
         off += deviations
     for range_g, ones in sorted(by_range.items()):
@@ -248,9 +248,9 @@ def drives(figures: Figures, extent: Extent) -> None:
         print(f"{range_g} g: in 1 {found.in_one:.3f}, in 2 {found.in_two:.3f}, bias {found.bias:+.1%}, "
               f"R2 {found.r2:.3f} of {found.count} windows on {len(ones)} roads")
     figures.at_least("noise within two standard errors", float(np.mean(np.abs(off) <= 2)), 0.95, "")
-    whole = score(pooled([one.windows for one in learnt]))
-    figures.at_most("learnt: in 1 off 0.683", abs(whole.in_one - 0.683), 0.04, "")
-    figures.at_most("learnt: in 2 off 0.954", abs(whole.in_two - 0.954), 0.04, "")
+    whole = score(pooled([one.windows for one in learned]))
+    figures.at_most("learned: in 1 off 0.683", abs(whole.in_one - 0.683), 0.04, "")
+    figures.at_most("learned: in 2 off 0.954", abs(whole.in_two - 0.954), 0.04, "")
 
 
 def beside_limit(noise: float, range_g: int, mph: int, level: float, extent: Extent, number: int

@@ -1,4 +1,4 @@
-"""A late receiver on simulated drives: error of the delay that is learnt, and how often the truth is within the errors.
+"""A late receiver on simulated drives: error of the learned delay, and how often the truth is within the errors.
 
 Sensors at any angle about the vertical, tilted by up to 8 degrees, delays of 0.05 to 0.4 s, 20 minutes each. With a
 number as argument: so many drives of each kind. "unknown delay": IRI of 25 ft windows whose places are late by what is

@@ -187,7 +187,7 @@ def test_another_rate(tmp_path: Path, folder: Path, plain: dict[str, Any], capsy
 @pytest.mark.parametrize(("noise", "step", "rate"), [
     (0.11, 0.0, 100), pytest.param(0.2, 0.613, 100, marks=pytest.mark.slow),
     pytest.param(0.15, 0.0, 208, marks=pytest.mark.slow)])
-def test_the_noise_is_learnt_from_the_drive(
+def test_the_noise_is_learned_from_the_drive(
     folder: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], noise: float, step: float, rate: int
 ) -> None:
     assert main(["simulate", "--vehicle", CAR, "--profile", str(folder / "profile.csv"), "--speed", "16", "--noise",
@@ -201,7 +201,7 @@ def test_the_noise_is_learnt_from_the_drive(
     assert result["comparison"]["r2"] > taken["comparison"]["r2"] - 0.01
     assert main(["estimate", str(tmp_path), "--vehicle", CAR, "--step", str(step)]) == 0
     lines = capsys.readouterr().out.splitlines()
-    at = lines.index(f"Learnt from the drive: noise of {result['noise_mps2']:.3g} ± "
+    at = lines.index(f"Learned from the drive: noise of {result['noise_mps2']:.3g} ± "
                      f"{result['noise_std_mps2']:.1g} m/s2 in a reading")
     assert lines[at + 1].startswith("Assumed: ")
 
@@ -213,8 +213,8 @@ def test_the_noise_of_a_run_is_what_its_facts_say(folder: Path, tmp_path: Path, 
         (tmp_path / name).write_bytes((folder / name).read_bytes())
     write_run_facts(tmp_path, RecordFacts(noise_mps2=0.08))
     said = reported(capsys, tmp_path)
-    assert (said["noise_mps2"], said["noise_std_mps2"], said["noise_learnt"]) == (0.08, None, None)
-    assert reported(capsys, tmp_path, "--noise", "auto")["noise_learnt"]
+    assert (said["noise_mps2"], said["noise_std_mps2"], said["noise_learned"]) == (0.08, None, None)
+    assert reported(capsys, tmp_path, "--noise", "auto")["noise_learned"]
     assert reported(capsys, tmp_path, "--noise", "0.06")["noise_mps2"] == 0.06
 
 
@@ -240,7 +240,7 @@ def test_a_drive_that_tells_nothing_of_the_noise_says_so(
     columns["accel_z_mps2"] = np.random.default_rng(1).normal(0, 0.5, len(columns["t_s"]))
     write(tmp_path, columns)
     result = reported(capsys, tmp_path, "--step", step)
-    assert (result["noise_learnt"], result["noise_std_mps2"], result["noise_mps2"]) == (False, None, 0.05)
+    assert (result["noise_learned"], result["noise_std_mps2"], result["noise_mps2"]) == (False, None, 0.05)
     assert main(["estimate", str(tmp_path), "--vehicle", CAR, "--noise", "auto", "--step", str(step)]) == 0
     assert "This drive does not show the sensor's noise. Assumed: 0.05 m/s2" in capsys.readouterr().out
 

@@ -303,7 +303,7 @@ def test_a_log_of_another_day_holds_none_of_it(rows: list[WindowRecord]) -> None
 
 
 @pytest.mark.slow
-def test_what_the_session_knew_of_the_receiver_counts_and_not_what_was_learnt_since(
+def test_what_the_session_knew_of_the_receiver_counts_and_not_what_was_learned_since(
         short_dump: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path("ridelog.yaml").write_text("accelerometer: {driver: pasco}\n")
@@ -312,14 +312,14 @@ def test_what_the_session_knew_of_the_receiver_counts_and_not_what_was_learnt_si
         rows = expected_rows(wired(reader.header, reader, None, "x"), load_config(Path("ridelog.yaml")), "x", knew)
     log = tmp_path / "00004-001.csv"
     log.write_text("".join(f"{line}\n" for line in [row_format.HEADER, *map(row_format.format_row, rows)]))
-    learnt = tmp_path / DELAY.file_name
-    learnt.write_text(json.dumps(DELAY.fields(CarriedDelay(0.05, 0.02, 9))))
+    learned = tmp_path / DELAY.file_name
+    learned.write_text(json.dumps(DELAY.fields(CarriedDelay(0.05, 0.02, 9))))
     compared = ["hil", str(short_dump), "--log", ".", "--config", "ridelog.yaml"]
     store_sidecar(FileSystem(), log, {"receiver": DELAY.fields(knew)}, "finished", Tally(len(rows)), None)
     assert main.main(compared) == 0
-    log.with_suffix(".json").unlink()  # nothing but what was learnt since is left
+    log.with_suffix(".json").unlink()  # nothing but what was learned since is left
     assert main.main(compared) == 1
-    learnt.write_text(json.dumps(DELAY.fields(knew)))
+    learned.write_text(json.dumps(DELAY.fields(knew)))
     assert main.main(compared) == 0
 
 

@@ -161,9 +161,9 @@ def test_a_law_is_offered_where_no_effect_explains_it(tmp_path: Path, capsys: py
     assert printed["error_after"] < 1.1 * printed["noise_floor_error"] and not printed["unexplained"]
     assert [one.effect.name for one in read_model(out / "vehicle-1.yaml").effects] == ["learned_force_by_rate"]
     html = (out / "story.html").read_text("utf-8")
-    for words in ("A law learnt from the runs", "The law", "power_ratio", "with learned_force_by_rate"):
+    for words in ("A law learned from the runs", "The law", "power_ratio", "with learned_force_by_rate"):
         assert words in html
-    told_of = [html.index(words) for words in ("<h2>What was missing", "<h2>A law learnt from the runs", "<h2>Finally",
+    told_of = [html.index(words) for words in ("<h2>What was missing", "<h2>A law learned from the runs", "<h2>Finally",
                                                "Nothing is missing: with")]
     assert told_of == sorted(told_of)
 

@@ -57,7 +57,7 @@ def test_the_file_is_a_vehicle_whose_errors_the_box_can_use(learned: tuple[dict[
     whole_kg = 2 * sum((model.vehicle.sprung_mass_kg, model.vehicle.front.unsprung_mass_kg,
                         model.vehicle.rear.unsprung_mass_kg))  # type: ignore[union-attr]
     assert whole_kg == pytest.approx(1400)
-    assert path.read_text().startswith("# Learnt by ridelog learn-car from 4 drives")
+    assert path.read_text().startswith("# Learned by ridelog learn-car from 4 drives")
     assert "Spectra at" in page.read_text() and "<svg" in page.read_text()
 
 

@@ -150,8 +150,8 @@ def test_logs_whose_words_and_links_name_files_of_this_machine(verb: str, trap: 
     (logs / "00002-001.json").symlink_to(trap.folder / "other.json")
     (logs / "00003-001.csv").symlink_to(trap.folder / "00003-001.csv")
     (logs / "more").symlink_to(trap.folder)
-    for learnt in ("receiver-delay", "sensor-noise"):
-        (logs / learnt).write_text(json.dumps({"delay_s": word, "noise_mps2": word, "of": word}))
+    for learned in ("receiver-delay", "sensor-noise"):
+        (logs / learned).write_text(json.dumps({"delay_s": word, "noise_mps2": word, "of": word}))
     places = ("--from", logs, "--to", "out") if verb == "export" else (logs,)
     if verb == "export":
         Path("out").mkdir()

@@ -49,7 +49,7 @@ def test_demo_ends_with_logs_a_summary_and_a_page(ridelog: Path, tmp_path: Path)
     assert done.returncode == 0, done.stderr
     assert "Roughest places" in done.stdout
     assert "GPS delay: 0." in done.stdout
-    assert re.search(r"Sensor's noise: 0\.\d+ ± 0\.\d+ m/s2, learnt over 1 drive\n", done.stdout)
+    assert re.search(r"Sensor's noise: 0\.\d+ ± 0\.\d+ m/s2, learned over 1 drive\n", done.stdout)
     assert str(tmp_path / "out") in done.stdout
     assert (tmp_path / "out" / "report.html").read_text().startswith("<!doctype html>")
     assert len(rows(tmp_path / "out")) > 400

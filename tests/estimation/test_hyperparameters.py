@@ -8,7 +8,14 @@ import pytest
 
 from logger.estimation.car_response import CarResponse
 from logger.estimation.road_solver import Block, Solution, TimeGrid
-from logger.estimation.road_spectrum import COMMON_ROAD, FLATTENED_BELOW_CPM, PIVOT_CPM, RoadSpectrum, learnt, log_waves
+from logger.estimation.road_spectrum import (
+    COMMON_ROAD,
+    FLATTENED_BELOW_CPM,
+    PIVOT_CPM,
+    RoadSpectrum,
+    learned,
+    log_waves,
+)
 from logger.estimation.roughness import mean_resolved
 from logger.estimation.sensor_noise import with_noise
 from logger.roads import iso8608
@@ -62,7 +69,7 @@ def test_one_step_is_newtons_on_the_evidence_of_waves(before: RoadSpectrum | Non
 
     resolved = gain / (1 + gain)
     # The most probable waves have this power.
-    found = learnt(now, resolved * power / (1 + gain), resolved, log_waves(n), 1.0, before)
+    found = learned(now, resolved * power / (1 + gain), resolved, log_waves(n), 1.0, before)
     h = 1e-4
     slope = np.array([
         log_posterior(h, 0) - log_posterior(-h, 0), log_posterior(0, h) - log_posterior(0, -h)
@@ -79,7 +86,7 @@ def test_one_step_is_newtons_on_the_evidence_of_waves(before: RoadSpectrum | Non
 
 
 def whitened(block: Block, solution: Solution, variance: np.ndarray) -> np.ndarray:
-    """Power of each wave of the innovations over their deviations, as ``learnt`` takes it."""
+    """Power of each wave of the innovations over their deviations, as ``learned`` takes it."""
     white = np.fft.irfft(solution.waves, block.count) / np.sqrt(variance)
     return np.abs(np.fft.rfft(white)) ** 2 / block.count
 
@@ -121,7 +128,7 @@ def test_slope_is_that_of_the_exact_evidence_of_a_drive(variance_of: Callable[[B
     solution = block.solve(reading, weight, now, variance, DRIFT, 400)
     share = block.seen_points(weight > 0) / block.count
     resolved = mean_resolved(solution.gain, variance[block.seen(weight > 0) > 0])
-    found = learnt(now, whitened(block, solution, variance), resolved, block.log_waves, share, None)
+    found = learned(now, whitened(block, solution, variance), resolved, block.log_waves, share, None)
     step = np.array([found.log_level - now.log_level, found.waviness - now.waviness])
     h = 0.02
     slope = np.array([
@@ -158,7 +165,7 @@ def test_level_and_waviness_are_found_again(speed_mps: float) -> None:
                 solution = block.solve(reading, weight, spectrum, even, DRIFT, 8, waves)
                 waves = solution.waves
                 resolved = solution.gain / (1 + solution.gain)
-                spectrum = learnt(spectrum, whitened(block, solution, even), resolved, block.log_waves, share, None)
+                spectrum = learned(spectrum, whitened(block, solution, even), resolved, block.log_waves, share, None)
             rows = np.stack([np.ones(len(resolved)), -block.log_waves])
             information = (rows * share * resolved**2) @ rows.T + np.diag([1.8**-2, 0.3**-2])
             std = np.sqrt(np.linalg.inv(information)[0, 0])
@@ -230,7 +237,7 @@ def test_a_sensor_that_hangs_is_not_taken_for_one_without_noise() -> None:
 def test_nothing_read_leaves_what_roads_are_like() -> None:
     block = a_block(1024, 15.0)
     waves = np.zeros(len(block.wave_number_cpm))
-    found = learnt(COMMON_ROAD, waves, waves, block.log_waves, 0.0, None)
+    found = learned(COMMON_ROAD, waves, waves, block.log_waves, 0.0, None)
     assert found == COMMON_ROAD
     assert with_noise(0.0, np.zeros(1024), np.zeros(1024), 0.0) == pytest.approx(0.0, abs=0.2)
 

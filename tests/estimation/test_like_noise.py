@@ -102,13 +102,13 @@ def test_the_desk_counts_how_well_the_noise_is_known() -> None:
 
 
 @pytest.mark.slow
-def test_an_assessment_whose_noise_was_learnt_is_less_sure_than_one_whose_noise_was_given() -> None:
+def test_an_assessment_whose_noise_was_learned_is_less_sure_than_one_whose_noise_was_given() -> None:
     recorded, vehicle = Estimable(100.0, readings(ALIKE)[:2500], felt()[1][:2500], 0.0), read_vehicle(RAV4)
-    learnt = assess(recorded, vehicle, Sensor(NOISE_MPS2, ALIKE), 7.62, None, learns_noise=True)
-    given = assess(recorded, vehicle, learnt.sensor, 7.62, None)
+    learned = assess(recorded, vehicle, Sensor(NOISE_MPS2, ALIKE), 7.62, None, learns_noise=True)
+    given = assess(recorded, vehicle, learned.sensor, 7.62, None)
     known = np.isfinite(given.windows.iri_m_per_km)
     assert known.any()
-    assert (learnt.windows.iri_std_m_per_km[known] > 1.001 * given.windows.iri_std_m_per_km[known]).all()
+    assert (learned.windows.iri_std_m_per_km[known] > 1.001 * given.windows.iri_std_m_per_km[known]).all()
 
 
 def test_what_is_taken_off_a_nonlinear_cars_readings_is_on_no_other_steps() -> None:

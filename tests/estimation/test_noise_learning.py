@@ -233,21 +233,21 @@ def readings_of_a_stand(noise: float, count: int, seed: int) -> tuple[np.ndarray
 
 @pytest.mark.parametrize("count", [1000, 60_000, 240_000])
 def test_however_long_a_stand_it_only_bounds_the_noise(count: int) -> None:
-    """What shakes an idling car is not the sensor's: less stays possible, and what was learnt stays known."""
+    """What shakes an idling car is not the sensor's: less stays possible, and what was learned stays known."""
     shaken = NoiseLearner(USUAL, USUAL, STEP)
     shaken.take(parked_evidence(*readings_of_a_stand(0.25 / STEP, count, 1), shaken.log_noise - np.log(STEP)))
     assert shaken.belief.noise_rms_mps2 < 0.25
     assert abs(shaken.belief.log_mean - USUAL.log_mean) < 1.5 * shaken.belief.log_std
     rng = np.random.default_rng(2)
-    learnt = NoiseLearner(USUAL, USUAL, STEP)
+    learned = NoiseLearner(USUAL, USUAL, STEP)
     for _ in range(60):
         expected = rng.uniform(-1, 1, 200)
         low = STEP * (np.round((expected + rng.normal(0, 0.3, 200)) / STEP) - 0.5)
-        learnt.take(interval_evidence(expected, np.full(200, 1e-3), low, low + STEP, learnt.log_noise))
-    before = learnt.belief
-    learnt.take(parked_evidence(*readings_of_a_stand(0.3 / STEP, count, 3), learnt.log_noise - np.log(STEP)))
-    assert abs(learnt.belief.log_mean - before.log_mean) < 2 * before.log_std
-    assert learnt.belief.log_std < 2 * before.log_std
+        learned.take(interval_evidence(expected, np.full(200, 1e-3), low, low + STEP, learned.log_noise))
+    before = learned.belief
+    learned.take(parked_evidence(*readings_of_a_stand(0.3 / STEP, count, 3), learned.log_noise - np.log(STEP)))
+    assert abs(learned.belief.log_mean - before.log_mean) < 2 * before.log_std
+    assert learned.belief.log_std < 2 * before.log_std
 
 
 def test_within_a_service_that_runs_for_weeks_each_drive_begins_less_certain() -> None:

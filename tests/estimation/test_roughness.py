@@ -52,7 +52,7 @@ def read(variance: np.ndarray, rng: np.random.Generator) -> np.ndarray:
 
 
 def settled(reading: np.ndarray, rounds: int = 16) -> RoadLevels:
-    """What is learnt of a block from nothing, round by round."""
+    """What is learned of a block from nothing, round by round."""
     block, _, seen = a_block()
     found, start = RoadLevels(SPACING_M), None
     for _ in range(rounds):
@@ -227,7 +227,7 @@ def test_a_pothole_raises_no_level() -> None:
     assert with_hole == pytest.approx(without, abs=0.15)
 
 
-def learnt_from(first: int, innovations: np.ndarray, found: RoadLevels) -> None:
+def learned_from(first: int, innovations: np.ndarray, found: RoadLevels) -> None:
     """A block that shows its innovations exactly, until it settles."""
     count = len(innovations)
     for _ in range(16):
@@ -239,22 +239,22 @@ def test_what_blocks_behind_have_shown_counts_as_if_all_were_one_block() -> None
     size = round(8.0 / SPACING_M)
     innovations = np.random.default_rng(3).standard_normal(60 * size) * np.repeat([1.0, 3.0, 0.5], 20 * size)
     whole, parts = RoadLevels(SPACING_M), RoadLevels(SPACING_M)
-    learnt_from(0, innovations, whole)
-    learnt_from(0, innovations[:40 * size], parts)
-    learnt_from(24 * size, innovations[24 * size:], parts)
+    learned_from(0, innovations, whole)
+    learned_from(0, innovations[:40 * size], parts)
+    learned_from(24 * size, innovations[24 * size:], parts)
     inner = 42 * size, 16 * size
     assert parts.at(*inner) == pytest.approx(whole.at(*inner), abs=0.02)
     assert parts.log_std(*inner) == pytest.approx(whole.log_std(*inner), rel=0.02)
     alone = RoadLevels(SPACING_M)
-    learnt_from(24 * size, innovations[24 * size:], alone)
+    learned_from(24 * size, innovations[24 * size:], alone)
     assert abs(alone.at(24 * size, size) - whole.at(24 * size, size)).max() > 0.02  # it has no road behind it
 
 
-def test_what_is_learnt_is_kept_by_place() -> None:
+def test_what_is_learned_is_kept_by_place() -> None:
     """Points have their numbers whatever block they lie in; what no block has seen yet goes on as the last one."""
     rng = np.random.default_rng(3)
     found = RoadLevels(SPACING_M)
-    learnt_from(-40, rng.standard_normal(512) * np.repeat([1.0, 5.0], 256), found)
+    learned_from(-40, rng.standard_normal(512) * np.repeat([1.0, 5.0], 256), found)
     whole = found.solved_with(-40, 512)
     assert whole[300:480].mean() > whole[40:220].mean() + 2.5
     part = found.solved_with(60, 600)
@@ -292,7 +292,7 @@ def test_mean_reported_is_the_mean_over_points(variance: np.ndarray) -> None:
     assert mean_resolved(gain, np.empty(0)) == pytest.approx(gain / (1 + gain))
 
 
-def learnt_over_drives(variance: np.ndarray) -> tuple[float, RoadLevels]:
+def learned_over_drives(variance: np.ndarray) -> tuple[float, RoadLevels]:
     """Scatter of the log variance over the road that was read, over the last of twelve drives; and what is believed."""
     block, _, seen = a_block()
     rng, scatter, found = np.random.default_rng(5), [], RoadLevels(SPACING_M)
@@ -309,10 +309,10 @@ def learnt_over_drives(variance: np.ndarray) -> tuple[float, RoadLevels]:
 
 
 @pytest.mark.slow
-def test_that_a_road_is_gaussian_is_learnt_and_that_it_is_patchy_is_kept() -> None:
+def test_that_a_road_is_gaussian_is_learned_and_that_it_is_patchy_is_kept() -> None:
     even, patchy = np.ones(a_block()[0].count), np.where(np.arange(a_block()[0].count) // 60 % 3 == 0, 6.0, 1.0)
-    scatter, believed = learnt_over_drives(even)
-    of_patches, of_patchy = learnt_over_drives(patchy)
+    scatter, believed = learned_over_drives(even)
+    of_patches, of_patchy = learned_over_drives(patchy)
     assert scatter < 0.2 < 0.5 < of_patches
     # What patches of 9 m leave to the scale of a place is not the level's.
     assert 1.5 * believed.variances[:2].sum() < of_patchy.variances[:2].sum()
@@ -341,8 +341,8 @@ def test_an_even_block_counts_against_scatter_no_more_than_a_patchy_one_for_it()
     for innovations in [even, patchy] * 30:
         found.learn(0, innovations, np.zeros(count), gain, np.ones(count), learns=True)
     fresh.learn(0, patchy, np.zeros(count), gain, np.ones(count))
-    scatter, unlearnt = (float(one.solved_with(0, count).std()) for one in (found, fresh))
-    assert scatter > 0.5 * unlearnt
+    scatter, unlearned = (float(one.solved_with(0, count).std()) for one in (found, fresh))
+    assert scatter > 0.5 * unlearned
 
 
 @pytest.mark.slow

@@ -1,4 +1,4 @@
-"""Variances that are learnt block by block, on draws of which they are known."""
+"""Variances that are learned block by block, on draws of which they are known."""
 
 import numpy as np
 import pytest

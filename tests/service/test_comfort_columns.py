@@ -63,7 +63,7 @@ def test_without_one_the_power_of_the_noise_is_taken_off() -> None:
         assert found.ride.a_w.std > 0.0
 
 
-def test_a_learnt_noise_counts_with_its_error() -> None:
+def test_a_learned_noise_counts_with_its_error() -> None:
     given = columns().of(WINDOW, None, None).ride.a_w
     same = columns(noise_mps2=0.4).of(WINDOW, None, NoiseBelief(np.log(0.1), 0.3)).ride.a_w
     assert same.value == pytest.approx(given.value)

@@ -36,13 +36,13 @@ DRIVEN_MPS2 = 0.1  # that of the demo's drives
 
 
 class Drive:
-    """A pipeline that has learnt so much."""
+    """A pipeline that has learned so much."""
 
     def __init__(self, belief: NoiseBelief | None, stretches: int) -> None:
         self.noise, self.noise_stretches = belief, stretches
 
 
-LEARNT = Drive(NoiseBelief(log(0.2), 0.04), 12)
+LEARNED = Drive(NoiseBelief(log(0.2), 0.04), 12)
 NOTHING = Drive(NoiseBelief(log(0.3), 1.0), 0)
 
 
@@ -68,7 +68,7 @@ def test_the_setting(tmp_path: Path, text: str, noise: float | str | None) -> No
     assert (sensor.noise is not None) == (noise == AUTO)
 
 
-def test_what_was_learnt_of_the_mean_of_several_readings_is_not_taken_for_that_of_one(tmp_path: Path) -> None:
+def test_what_was_learned_of_the_mean_of_several_readings_is_not_taken_for_that_of_one(tmp_path: Path) -> None:
     """Recordings and files of programs that took the mean of several readings to have no steps."""
     settings = "accelerometer:\n  driver: bma220\n  noise_mps2: auto\n  bma220: {oversample: 4}\n"
     config = config_of(settings, tmp_path)
@@ -87,29 +87,29 @@ def test_a_setting_that_cannot_be_is_refused(tmp_path: Path, value: str) -> None
         config_of(f"accelerometer:\n  noise_mps2: {value}\n", tmp_path)
 
 
-def test_what_is_learnt_is_there_at_the_next_start(tmp_path: Path) -> None:
+def test_what_is_learned_is_there_at_the_next_start(tmp_path: Path) -> None:
     assert noise_at_start(tmp_path, LEARNS) is None
-    NoiseLearning(tmp_path, LEARNT, LEARNS, None).save()
+    NoiseLearning(tmp_path, LEARNED, LEARNS, None).save()
     first = read_noise(tmp_path, LEARNS)
     assert first is not None
     assert (first.belief.noise_rms_mps2, first.drives) == (pytest.approx(0.2), 1)
     begun = noise_at_start(tmp_path, LEARNS)
     assert begun is not None and begun.belief.log_std > first.belief.log_std
-    NoiseLearning(tmp_path, LEARNT, LEARNS, begun).save()
+    NoiseLearning(tmp_path, LEARNED, LEARNS, begun).save()
     again = read_noise(tmp_path, LEARNS)
     assert again is not None and again.drives == 2
-    assert noise_at_start(tmp_path, AccelerometerConfig(noise_mps2=0.15)) is None  # it is not to be learnt
+    assert noise_at_start(tmp_path, AccelerometerConfig(noise_mps2=0.15)) is None  # it is not to be learned
 
 
 def test_of_a_sensor_that_is_set_otherwise_nothing_is_known(tmp_path: Path) -> None:
-    NoiseLearning(tmp_path, LEARNT, LEARNS, None).save()
+    NoiseLearning(tmp_path, LEARNED, LEARNS, None).save()
     ranged = replace(LEARNS, sections={**LEARNS.sections, "bma220": Bma220Config(range_g=8)})
     assert read_noise(tmp_path, ranged) is None
     assert read_noise(tmp_path, replace(LEARNS, driver="pasco")) is None
 
 
 @pytest.mark.parametrize("drive", [NOTHING, Drive(None, 0)])
-def test_nothing_learnt_writes_nothing(tmp_path: Path, drive: Drive) -> None:
+def test_nothing_learned_writes_nothing(tmp_path: Path, drive: Drive) -> None:
     NoiseLearning(tmp_path, drive, LEARNS, KNOWN).save()
     assert list(tmp_path.iterdir()) == []
 
@@ -156,7 +156,7 @@ def test_a_recording_by_a_logger_that_did_not_learn_replays_with_what_it_took() 
         sensor = wiring.instrument(config.accelerometer)
         assert (sensor.noise is not None) == (setting == AUTO)
         assert sensor.sensor.noise_rms_mps2 == pytest.approx(setting if isinstance(setting, float) else USUAL_MPS2)
-    written = wiring.dump_header(Config())  # of today, before it learnt anything
+    written = wiring.dump_header(Config())  # of today, before it learned anything
     assert "latency_s" in written.gps and written.accelerometer["noise"] == {"noise_mps2": AUTO}
 
 
@@ -179,9 +179,9 @@ def test_a_drive_learns_the_noise_that_its_sensor_had(recorded: tuple[DumpHeader
     core.finish()
     config = wiring.config_for_dump(auto, None, None).accelerometer
     NoiseLearning(tmp_path, pipeline, config, None).save()
-    learnt = read_noise(tmp_path, config)
-    assert learnt is not None
-    assert abs(learnt.belief.log_mean - log(DRIVEN_MPS2)) < 2 * learnt.belief.log_std  # the belief is log-normal
+    learned = read_noise(tmp_path, config)
+    assert learned is not None
+    assert abs(learned.belief.log_mean - log(DRIVEN_MPS2)) < 2 * learned.belief.log_std  # the belief is log-normal
 
 
 @pytest.mark.slow
@@ -202,6 +202,6 @@ def test_status_says_it_in_words(tmp_path: Path) -> None:
         return NoiseLearning(tmp_path, drive, config, known).words()
 
     assert words(AccelerometerConfig(noise_mps2=0.15)) == "0.15 m/s2 by the settings"
-    assert words(LEARNS) == "0.2 m/s2 assumed; it is learnt while driving"
-    assert words(LEARNS, known=KNOWN) == "0.15 ± 0.009 m/s2, learnt over 3 drives"
-    assert words(LEARNS, LEARNT) == "0.2 ± 0.008 m/s2, learnt over 1 drive"
+    assert words(LEARNS) == "0.2 m/s2 assumed; it is learned while driving"
+    assert words(LEARNS, known=KNOWN) == "0.15 ± 0.009 m/s2, learned over 3 drives"
+    assert words(LEARNS, LEARNED) == "0.2 ± 0.008 m/s2, learned over 1 drive"

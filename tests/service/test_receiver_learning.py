@@ -48,29 +48,29 @@ NOTHING = Told(DelayEstimate(reason="not enough driving yet"))
 AUTO, SET = GpsConfig(), GpsConfig(latency_s=0.25)
 
 
-def test_what_is_learnt_is_there_at_the_next_start(tmp_path: Path) -> None:
+def test_what_is_learned_is_there_at_the_next_start(tmp_path: Path) -> None:
     assert read_delay(tmp_path) is None
     assert delay_at_start(AUTO, None) == UNKNOWN
     ReceiverLearning(tmp_path, FOUND, UNKNOWN, None).save()
-    learnt = read_delay(tmp_path)
-    assert learnt is not None
-    assert learnt.delay_s == pytest.approx(0.159, abs=0.001)
-    assert learnt.std_s == pytest.approx(0.0148, abs=0.001)
-    assert learnt.drives == 1
-    assert delay_at_start(AUTO, learnt) == learnt
-    ReceiverLearning(tmp_path, FOUND, learnt, learnt).save()
+    learned = read_delay(tmp_path)
+    assert learned is not None
+    assert learned.delay_s == pytest.approx(0.159, abs=0.001)
+    assert learned.std_s == pytest.approx(0.0148, abs=0.001)
+    assert learned.drives == 1
+    assert delay_at_start(AUTO, learned) == learned
+    ReceiverLearning(tmp_path, FOUND, learned, learned).save()
     again = read_delay(tmp_path)
     assert again is not None
     assert again.drives == 2
-    assert again.std_s < learnt.std_s
+    assert again.std_s < learned.std_s
     assert [path.name for path in tmp_path.iterdir()] == [DELAY.file_name]
 
 
 def test_a_delay_of_about_nothing_is_read_back(tmp_path: Path) -> None:
     before_the_sensor = Told(DelayEstimate(-0.02, 0.015))
     ReceiverLearning(tmp_path, before_the_sensor, UNKNOWN, None).save()
-    learnt = read_delay(tmp_path)
-    assert learnt is not None and learnt.delay_s == 0.0 and learnt.drives == 1
+    learned = read_delay(tmp_path)
+    assert learned is not None and learned.delay_s == 0.0 and learned.drives == 1
 
 
 def test_a_number_in_the_settings_counts_and_has_no_error() -> None:
@@ -86,7 +86,7 @@ def test_it_is_saved_now_and_then(tmp_path: Path) -> None:
     assert read_delay(tmp_path) is not None
 
 
-def test_nothing_learnt_writes_nothing(tmp_path: Path) -> None:
+def test_nothing_learned_writes_nothing(tmp_path: Path) -> None:
     ReceiverLearning(tmp_path, NOTHING, UNKNOWN, None).save()
     assert list(tmp_path.iterdir()) == []
 
@@ -141,8 +141,8 @@ def test_a_recording_replays_with_what_its_drive_went_by(short_dump: Path) -> No
     with open_dump(short_dump) as reader:
         header, events = reader.header, list(reader)[:6000]
     header = replace(header, accelerometer={**header.accelerometer, "noise": {"noise_mps2": "auto"}})
-    learnt = replace(header, gps={**header.gps, **DELAY.fields(CarriedDelay(0.25, 0.0, 3))})
-    rows = rows_of(learnt, events).rows
+    learned = replace(header, gps={**header.gps, **DELAY.fields(CarriedDelay(0.25, 0.0, 3))})
+    rows = rows_of(learned, events).rows
     assert rows == rows_of(header, events, config_of(header, SET)).rows
     assert rows != rows_of(header, events).rows
 
@@ -157,12 +157,12 @@ def test_a_sidecar_says_what_its_rows_went_by() -> None:
 
 
 def test_status_says_it_in_words(tmp_path: Path) -> None:
-    learnt = CarriedDelay(0.14, 0.02, 2)
-    words = ReceiverLearning(tmp_path, NOTHING, learnt, learnt).words()
-    assert words == "0.14 ± 0.02 s, learnt over 2 drives"
-    assert ReceiverLearning(tmp_path, FOUND, learnt, learnt).words().endswith("learnt over 3 drives")
+    learned = CarriedDelay(0.14, 0.02, 2)
+    words = ReceiverLearning(tmp_path, NOTHING, learned, learned).words()
+    assert words == "0.14 ± 0.02 s, learned over 2 drives"
+    assert ReceiverLearning(tmp_path, FOUND, learned, learned).words().endswith("learned over 3 drives")
     first = ReceiverLearning(tmp_path, FOUND, UNKNOWN, None).words()
-    assert first.endswith("learnt over 1 drive; from the next start on")
+    assert first.endswith("learned over 1 drive; from the next start on")
     assert ReceiverLearning(tmp_path, NOTHING, UNKNOWN, None).words() == \
         "0.14 ± 0.07 s, assumed: not enough driving yet"
     assert ReceiverLearning(tmp_path, NOTHING, delay_at_start(SET, None), None).words() == "0.25 s by the settings"

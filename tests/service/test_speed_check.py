@@ -52,7 +52,7 @@ def test_a_speed_that_is_not_that_of_the_places_gives_no_iri_and_is_said(tmp_pat
     last = car.rows.records[-1]
     assert "speed_doubtful" not in last.flags
     assert last.iri_rms_m_per_km is not None
-    assert last.iri_m_per_km is not None or "faint" in last.flags  # this car's readings are white: learnt as noise
+    assert last.iri_m_per_km is not None or "faint" in last.flags  # this car's readings are white: learned as noise
 
 
 @pytest.mark.slow

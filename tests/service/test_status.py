@@ -87,8 +87,8 @@ def test_this_process_exists_and_an_ended_one_does_not() -> None:
 
 
 def test_the_screen_of_a_healthy_service_says_so() -> None:
-    late = replace(STATUS, receiver_delay="0.14 ± 0.02 s, learnt over 3 drives")
-    assert "  receiver delay  0.14 ± 0.02 s, learnt over 3 drives" in screen(late, None)
+    late = replace(STATUS, receiver_delay="0.14 ± 0.02 s, learned over 3 drives")
+    assert "  receiver delay  0.14 ± 0.02 s, learned over 3 drives" in screen(late, None)
     text = "\n".join(screen(STATUS, None))
     assert "is recording, up 1 h 02 min" in text
     assert "72 km/h, IRI 3.2 m/km, a little uncomfortable, time_unset" in text

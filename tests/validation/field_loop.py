@@ -142,8 +142,8 @@ def put(made: Case, sensor: str, numbers_off: bool) -> tuple[str, dict[str, Wind
             command = ["extract", str(dump), "--out", str(folder / "runs"), "--profile", str(line), "--json"]
             extracted, _ = asked(command, in_process=False)
             runs.append(extracted["runs"][0]["run"])
-        *learnt, kept = runs
-        said = identified(files, learnt) if numbers_off else diagnosed(files, learnt)
+        *learned, kept = runs
+        said = identified(files, learned) if numbers_off else diagnosed(files, learned)
         return said, {which: estimated(kept, path, folder / f"{which}.csv") for which, path in files.items()}
 
 

@@ -115,7 +115,7 @@ _DOWNLOAD = "clone github.com/commaai/comma2k19 (MIT), which holds a segment in 
 STUDY = Study(
     "comma2k19", "A minute of highway in a RAV4: from raw files to rows and a map", "Example_1",
     "The segment is processed like any recording: extract --csv with the receiver's positions and speed, then estimate "
-    "with the noise learnt. The device sat on the windscreen, where it feels pitch as well; the model's sensor sits "
+    "with the noise learned. The device sat on the windscreen, where it feels pitch as well; the model's sensor sits "
     "in the middle, unless --vehicle names another car. This was run on the real minute.",
     from_folder("comma2k19", _DOWNLOAD, run), (Item("comma2k19", Word.NOT_REPRODUCIBLE,
     "No IRI of this minute was published; the receiver's speed lags the car's and exceeds it, by the figures above."),),

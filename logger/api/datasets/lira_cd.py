@@ -232,10 +232,10 @@ def _repeats(road: ProfiledRoad, window_m: float) -> list[tuple[Any, ...]]:
 _DOWNLOAD = "download LiRA-CD, doi 10.11583/DTU.c.6337148, and unpack it; AutoPi_CAN and ref_data are read"
 STUDY = Study(
     "lira_cd", "Electric cars against the road directorate's profiler, 10 m and 100 m", "IRI of P79",
-    "Each pass is processed like any recording (extract --csv, estimate with the noise learnt). Its windows are placed "
-    "on the profiler's cells by GPS, then moved by up to 30 m to where they fit best. The parameters of the cars "
-    "(Renault Zoe) are not published: the model of a sedan replaces them, unless --vehicle names another. The reader "
-    "is tested on small files of the same layout.",
+    "Each pass is processed like any recording (extract --csv, estimate with the noise learned). Its windows are "
+    "placed on the profiler's cells by GPS, then moved by up to 30 m to where they fit best. The parameters of the "
+    "cars (Renault Zoe) are not published: the model of a sedan replaces them, unless --vehicle names another. The "
+    "reader is tested on small files of the same layout.",
     data_sets.from_folder("LiRA-CD", _DOWNLOAD, run), (Item("LiRA-CD", Word.NOT_REPRODUCIBLE, data_sets.NOT_RUN),),
     source="Skar et al., LiRA-CD, Data in Brief, 2023", data=f"LiRA-CD ({_DOWNLOAD})")
 STUDIES = (STUDY,)

@@ -45,7 +45,7 @@ class LearnedModel:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class LearnedLaw(CommandResult):
-    """A law learnt from the data, or why there is none.
+    """A law learned from the data, or why there is none.
 
     found                all that was learned
     vehicle              name of the one that it is of
@@ -92,7 +92,7 @@ class LearnedLaw(CommandResult):
     def as_page(self, of: str) -> Html:
         """What was learned as one HTML document."""
         runs = ", ".join(run.name for run in self.found.learning.context.runs)
-        return page(f"{self.vehicle}: a law learnt from runs", runs, self.blocks())
+        return page(f"{self.vehicle}: a law learned from runs", runs, self.blocks())
 
     def next_words(self, question: Any, written: Mapping[str, Sequence[Path]]) -> str:
         """How to add the law, together with what it was fitted with."""
@@ -176,17 +176,17 @@ def why_none(found: Learning) -> str:
     """Why no law is learned."""
     if (one := found.refused) is not None:
         add = "" if one.known is None else f": ridelog add-effect {one.known.one.effect.name}"
-        return f"no law learnt: {one.title} would explain the residual best, but {one.why}{add}"
+        return f"no law learned: {one.title} would explain the residual best, but {one.why}{add}"
     if not found.verdict and not found.unexplained:
         return NOTHING
     if not found.verdict:
-        return "no law learnt: something is missing, but no known effect and no law of these families explains it"
+        return "no law learned: something is missing, but no known effect and no law of these families explains it"
     names = " and ".join(found.verdict)
     many = len(found.verdict) > 1
     if found.unexplained or (found.diagnosis is not None and not found.diagnosis.reaches_floor):
-        return (f"no law learnt: {names} explain{'s' * (not many)} part of what is missing, and no law of these "
+        return (f"no law learned: {names} explain{'s' * (not many)} part of what is missing, and no law of these "
                 "families explains it better")
-    return f"no law learnt: {names} explain{'s' * (not many)} the residual"
+    return f"no law learned: {names} explain{'s' * (not many)} the residual"
 
 
 def law_blocks(learned: LearnedModel) -> Iterator[Block]:

@@ -354,7 +354,7 @@ def ending(story: Story) -> list[str]:
         lines.append("Something is still missing that no known effect explains. Next: ridelog learn, or an effect of "
                      "your own.")
     elif diagnosis.unexplained:
-        lines.append("Something is still missing that no known effect and no learnt law explains. Next: an effect of "
+        lines.append("Something is still missing that no known effect and no learned law explains. Next: an effect of "
                      "your own.")
     else:
         lines.append(f"Nothing {'more ' * bool(story.added)}is missing, as far as these runs can show.")
@@ -430,8 +430,8 @@ def _law(story: Story) -> list[Section]:
         return []
     if sought.learning.law is None or sought.addition is None:
         said = learning.why_none(sought.learning)
-        return [Section("A law learnt from the runs", [f"{said[0].upper()}{said[1:]}."])]
-    return [Section("A law learnt from the runs", [
+        return [Section("A law learned from the runs", [f"{said[0].upper()}{said[1:]}."])]
+    return [Section("A law learned from the runs", [
         *learning.sentences(sought.learning.law, sought.addition), f"Written to {story.law_file}."]),
         *learning.law_sections(sought.learning.law, sought.addition, learning.picture_of(sought))]
 

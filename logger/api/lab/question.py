@@ -256,7 +256,7 @@ class LabLoopQuestion(LabQuestion):
                    "none; without it everything missing is added"] = str
     candidates: shared_fields.Candidates = None
     effect_files: shared_fields.EffectFiles = ()
-    learns: Annotated[bool, "whether a law is learnt at all"] = True
+    learns: Annotated[bool, "whether a law is learned at all"] = True
 
 
 COMPARE = question.Verb(CompareQuestion, "logger.api.lab.compare:compare", (question.Out(

@@ -31,7 +31,7 @@ def picture(draft: Draft, found: Chosen, errors: NumberErrors, context: LawConte
     reach = context.reach(motion, CURVE_REACH)
     at = np.linspace(-reach, reach, CURVE_POINTS)
     damping = context.vehicle.front.suspension_damping_n_s_per_m
-    line = Line("learnt", at, draft.force_n(found.values, at, damping), _band(draft, found, errors, at, damping))
+    line = Line("learned", at, draft.force_n(found.values, at, damping), _band(draft, found, errors, at, damping))
     return Curves(draft.title, name, "force [N]", (line,))
 
 

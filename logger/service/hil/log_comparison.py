@@ -318,7 +318,7 @@ def _pairs(expected: Sequence[WindowRecord], rows: Sequence[WindowRecord], shift
 
 
 def _before_utc(pairs: Sequence[Pair]) -> list[Pair]:
-    """The pairs of an open log; the expected rows that come before the service had learnt UTC are without it too.
+    """The pairs of an open log; the expected rows that come before the service had learned UTC are without it too.
     Such rows get it when their file is finished. How many they are is chance: a fix may come as a row is written."""
     undated = list(takewhile(lambda pair: pair[1].utc_us is None, pairs))
     return [(replace(wanted, utc_us=None), found) for wanted, found in undated] + list(pairs[len(undated):])

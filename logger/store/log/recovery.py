@@ -45,7 +45,7 @@ def repair(directory: Path, files: FileSystem | None = None,
     """Put the folder right after a service that was killed: finish its parts, in order of their names.
 
     Every intact row is kept; damaged lines are left out and counted in the sidecar; UTC is filled in where the
-    session had learnt it. Repairing twice does nothing more. Must not run while a service writes to the folder.
+    session had learned it. Repairing twice does nothing more. Must not run while a service writes to the folder.
     A part on which the disk fails does not keep the others from being finished. Raises ``OSError`` for the folder.
     """
     files = files or FileSystem()

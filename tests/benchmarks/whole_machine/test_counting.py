@@ -49,7 +49,7 @@ def test_a_promised_row_that_is_not_there_is_lost_and_a_newer_one_is_the_price()
     assert (outcome.promised, outcome.found, outcome.lost, outcome.newer_lost) == (2, 1, 1, 1)
 
 
-def test_a_repaired_row_may_have_learnt_its_time_and_nothing_else() -> None:
+def test_a_repaired_row_may_have_learned_its_time_and_nothing_else() -> None:
     looks = read_looks("\n".join([look(10, row(1, "time_unset", "")), look(12)]))
     assert compare(looks, {"00001-001.csv": f"{HEADER}\n{row(1)}\n"}).lost == 0
     outcome = compare(looks, {"00001-001.csv": f"{HEADER}\n{row(1, speed='15.0')}\n"})

@@ -114,7 +114,7 @@ def test_older_exports_of_files_that_the_card_no_longer_has_stay(logs: Path, sti
     assert set(read_manifest([(own(logs, stick) / manifest.NAME).read_bytes()]).files) == {*NAMES, "00005-001.csv"}
 
 
-def test_a_log_that_learnt_its_utc_is_exported_again_and_the_old_one_kept(logs: Path, stick: Path) -> None:
+def test_a_log_that_learned_its_utc_is_exported_again_and_the_old_one_kept(logs: Path, stick: Path) -> None:
     run(logs, stick)
     old = (logs / NAMES[0]).read_bytes()
     (logs / NAMES[0]).write_bytes(b"the same rows, with UTC\n")

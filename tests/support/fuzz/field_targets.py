@@ -217,9 +217,9 @@ def geojson(folder: Path) -> Target:
 
 
 def small_json(folder: Path) -> Target:
-    """What the service keeps for itself: what is learnt, sidecars, status, notes of sticks, calibrations; and the
+    """What the service keeps for itself: what is learned, sidecars, status, notes of sticks, calibrations; and the
     manifest of a fleet. Of these a damaged one is as none, or refused; it never ends anything."""
-    learnt = {"latency_s": 0.2, "latency_std_s": 0.01, "latency_drives": 3}
+    learned = {"latency_s": 0.2, "latency_std_s": 0.01, "latency_drives": 3}
     noise = {"noise_mps2": 0.05, "noise_std_mps2": 0.01, "noise_drives": 2, "of": {"driver": "bma220"}}
     fleet = {"ridelog_fleet": 1, "roads": "x", "trim_m": 100.0, "commits": [
         {"name": "00001", "ledger": "ledger/1.parquet", "rows": 10, "files": [
@@ -232,7 +232,7 @@ def small_json(folder: Path) -> Target:
     status = {"pid": 1, "version": "1", "started_t_us": 1, "written_t_us": 2, "accelerometer": {"words": "x"}}
     sidecar = {"format": 1, "config": {"x": 1.0}, "clock_map": {"offset_us": 5}, "log": {"session": 1, "rows": 3}}
     note = {"name": "sda1", "state": "done", "finished": True, "words": "x"}
-    kinds = {"receiver-delay": learnt, "sensor-noise": noise, "fleet.json": fleet, "car.calibration.json": calibration,
+    kinds = {"receiver-delay": learned, "sensor-noise": noise, "fleet.json": fleet, "car.calibration.json": calibration,
              "trip_iri_1.json": lira, "status.json": status, "00001-001.json": sidecar, "sda1.1.json": note}
 
     def damage(rng: random.Random, data: bytes) -> bytes:
