@@ -30,8 +30,9 @@ from typing import TypeVar
 import numpy as np
 from scipy.ndimage import uniform_filter1d
 
+from logger.api.csv_recording import CsvSettings, extract_csv
 from logger.api.drives import Run, assessed, read_run, sensor_of
-from logger.api.extraction import CsvSettings, extract_csv, read_measured_profile
+from logger.api.extraction import read_measured_profile
 from logger.api.lab.bench import bench_with
 from logger.api.lab.compare import AddedEffect, add_effect
 from logger.api.lab.diagnose import Diagnosis, diagnose

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from logger.api.csv_recording import CsvSettings, recorded_csv
 from logger.api.drive_questions import LearnCarQuestion
-from logger.api.extraction import CsvSettings, even_drives, recorded_csv, recorded_dump
+from logger.api.extraction import even_drives, recorded_dump
 from logger.api.shared_fields import each
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, read_vehicle

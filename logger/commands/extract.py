@@ -113,7 +113,8 @@ def extracted(asked: ExtractQuestion) -> Checked:
 
 def _extractor(asked: ExtractQuestion) -> "Callable[[Path], Extracted]":
     """What makes runs of one recording. BadInput for two that would have one folder, and wrong settings."""
-    from logger.api.extraction import CsvSettings, extract_csv, extract_dump, name_of, read_measured_profile, run_name
+    from logger.api.csv_recording import CsvSettings, extract_csv, run_name
+    from logger.api.extraction import extract_dump, name_of, read_measured_profile
     from logger.service.config import load_config
     from logger.store.formats.logger_csv import named_columns
 
