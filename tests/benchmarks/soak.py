@@ -34,7 +34,7 @@ def main() -> int:
     day_s = day.cycles * CYCLE_S
     print(f"{day_s / 3600:g} h, {found.events / 1e6:.1f} million events in {found.wall_s:.0f} s: "
           f"{day_s / found.wall_s:.0f} times real time")
-    figures.at_most("processor time it took", found.cpu_s, PATIENCE_S, "s")
+    figures.at_most("processor time", found.cpu_s, PATIENCE_S, "s")
     _resources(found, START_US + day_s // 3 * 1_000_000, figures)
     _rows(found, day, figures)
     return 1 if figures.missed else 0
@@ -45,12 +45,12 @@ def _resources(found: Soaked, warm_us: int, figures: Figures) -> None:
     gained_bytes = found.gained(lambda sample: sample.memory_bytes, warm_us)
     gained_blocks = found.gained(lambda sample: sample.blocks, warm_us)
     open_files = [sample.open_files for sample in found.samples]
-    figures.at_most("memory gained after a third of the day", gained_bytes / 1e6, 1, "MB")
-    figures.at_most("of Python's objects alone", 100 * gained_blocks / found.samples[0].blocks, 1, "%")
-    figures.at_most("open files, most less fewest", max(open_files) - min(open_files), 1, "")
+    figures.at_most("memory gained after the first third", gained_bytes / 1e6, 1, "MB")
+    figures.at_most("Python objects gained after it", 100 * gained_blocks / found.samples[0].blocks, 1, "%")
+    figures.at_most("open files, most minus fewest", max(open_files) - min(open_files), 1, "")
     folder_bytes = max(sample.folder_bytes for sample in found.samples)
-    figures.at_most("folder, largest", folder_bytes / 1e6, QUOTA_BYTES / 1e6, "MB")
-    figures.at_least("recorded before space was kept for logs", found.dump_s / 3600, 4, "h")
+    figures.at_most("largest size of the folder", folder_bytes / 1e6, QUOTA_BYTES / 1e6, "MB")
+    figures.at_least("raw dump before logs needed its space", found.dump_s / 3600, 4, "h")
     figures.at_most("largest log file", max(found.log_bytes) / 1e3, MAX_FILE_BYTES / 1e3 + 1, "kB")
 
 
@@ -59,19 +59,19 @@ def _rows(found: Soaked, day: CarDay, figures: Figures) -> None:
     logs = [check for check in found.checks if check.kind == "log"]
     others = [problem for check in found.checks if check.kind != "log" for problem in check.problems]
     figures.at_least("log files", len(logs), truth.drives, "")
-    figures.at_most("drives counted wrong", abs(found.rows[-1].drive - truth.drives), 0, "")
-    figures.at_most("problems that verify finds in logs", sum(len(check.problems) for check in logs), 0, "")
+    figures.at_most("drives miscounted", abs(found.rows[-1].drive - truth.drives), 0, "")
+    figures.at_most("problems in logs, by ridelog verify", sum(len(check.problems) for check in logs), 0, "")
     silent = [problem for problem in others if "nothing from the accelerometer" in problem]
-    figures.at_most("problems in the dump", len(others) - len(silent), 0, "")
-    figures.at_least("sensors off, seen in what was recorded", len(silent), 1, "")
-    figures.at_most("and no more than there were", len(silent), truth.silences, "")
+    figures.at_most("problems in the raw dump", len(others) - len(silent), 0, "")
+    figures.at_least("sensor outages found in the raw dump", len(silent), 1, "")
+    figures.at_most("the same, none invented", len(silent), truth.silences, "")
     figures.at_most("rows lost", found.rows_lost, 0, "")
-    figures.at_least("rows", len(found.rows), truth.known_m / 7.62, "")
+    figures.at_least("rows written", len(found.rows), truth.known_m / 7.62, "")
     segments = [row.segment for row in found.rows]
     figures.at_most("segment numbers out of order", sum(b != a + 1 for a, b in pairwise([0, *segments])), 0, "")
-    figures.at_most("distance logged, off by", 100 * abs(found.known_m() / truth.known_m - 1), 0.5, "%")
-    figures.at_most("time without speed logged, off by", 100 * abs(found.blind_s() / truth.blind_s - 1), 0.5, "%")
-    figures.at_most("UTC of any row, off by", 1000 * max(found.utc_errors_s(day)), 100, "ms")
+    figures.at_most("error of the logged distance", 100 * abs(found.known_m() / truth.known_m - 1), 0.5, "%")
+    figures.at_most("error of the time without speed", 100 * abs(found.blind_s() / truth.blind_s - 1), 0.5, "%")
+    figures.at_most("largest error of a row's UTC", 1000 * max(found.utc_errors_s(day)), 100, "ms")
 
 
 if __name__ == "__main__":
