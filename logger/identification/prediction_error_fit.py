@@ -23,6 +23,7 @@ import numpy as np
 
 from logger.arrays import Array
 from logger.dsp.filters import DecimatingLowPass
+from logger.fitting.information_matrix import inverse
 from logger.fitting.levenberg_marquardt import Minimum, minimise
 from logger.identification.identifiability import (
     Finding,
@@ -359,7 +360,4 @@ def _covariance(problem: _FitProblem, point: _ResidualsAt, slopes: Array) -> Arr
     """Covariance (p, p) of the coordinates, from the information matrix and the scatter of the white residuals."""
     count, p = slopes.shape
     variance = float(point.white @ point.white) / max(count - p, 1)
-    information = slopes.T @ slopes + variance * np.diag(problem.precision)
-    scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
-    inverse = np.linalg.pinv(information * np.outer(scale, scale), rcond=1e-15, hermitian=True) * np.outer(scale, scale)
-    return np.asarray(inverse * variance)
+    return variance * inverse(slopes.T @ slopes + variance * np.diag(problem.precision))

@@ -19,10 +19,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from logger.arrays import Array
+from logger.fitting.information_matrix import inverse
 from logger.identification.drive_model import DriveModel
 from logger.identification.prediction_error_fit import Fit, FitOptions
 from logger.identification.session import fit_down_to_0, upright_fit
-from logger.lab.likelihood.distance_error import USUAL, RecordError
+from logger.lab.likelihood.distance_error import USUAL, RecordError, RigRecordError, record_error
 from logger.lab.likelihood.lag import offset_by_lag_m
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.readings import Readings
@@ -49,17 +50,16 @@ def fit_to_readings(model_of: ModelOf, records: list[Run], options: Callable[[Dr
     NotIdentifiable and ValueError as ``upright_fit``.
     """
     errors = [_distance_error(record) for record in records]
-    rounded, moves = False, any(one is not None for one in errors)
-    at = _from_lags(model_of(records), errors) if moves else [None] * len(records)
-    there = [_at(record, error, k) for record, error, k in zip(records, errors, at, strict=True)]
-    first = upright_fit(model_of, there, options)
-    found, model = first, model_of(there)
+    rounded, moves = False, any(error.places for error in errors)
+    at = _from_lags(model_of(records), errors) if moves else [np.zeros(error.count) for error in errors]
+    first = upright_fit(model_of, _moved(records, errors, at), options)
+    found, model = first, model_of(_moved(records, errors, at))
     if not moves and not any(record.facts.step_mps2 for record in records):
         return ReadingsFit(first, model)
     for turn in range(8):
         if moves:
-            at = _shift(model, found, errors, at).at
-        there = [_at(record, error, k) for record, error, k in zip(records, errors, at, strict=True)]
+            at = _with_places(model, found, errors, at).at
+        there = _moved(records, errors, at)
         predictions = _whole_predictions(model_of(there), _values(found))
         readings = [Readings.of(one).given(prediction) for one, prediction in zip(there, predictions, strict=True)]
         rounded = not all(one.rounding_is_noise for one in readings)
@@ -72,23 +72,24 @@ def fit_to_readings(model_of: ModelOf, records: list[Run], options: Callable[[Dr
         if turn and _has_converged(before, found):
             break
     if moves:
-        found = _with_covariance(found, _shift(model, found, errors, at))
-    off_m = max((float(np.abs(error.distance_error_m(k)).max()) for error, k in zip(errors, at, strict=True)
-                 if error is not None and k is not None), default=0.0)
+        found = replace(found, covariance=_with_places(model, found, errors, at).covariance)
+    off_m = max(float(np.abs(error.distance_error_m(k)).max()) for error, k in zip(errors, at, strict=True))
     return ReadingsFit(_with_rounding_noise(found, first, model, records), model, rounded, off_m)
 
 
-def _distance_error(record: Run) -> RecordError | None:
-    """The distance error of a run; None where it states no standard error of its places."""
-    if record.timed or not record.facts.place_std_m:
-        return None
-    return RecordError.of(record, Tolerance())
+def _distance_error(record: Run) -> RecordError:
+    """The distance error of a run; without numbers of places where it states no standard error of them."""
+    from scipy.sparse import csr_array
+
+    if record.facts.place_std_m:
+        return record_error(record, Tolerance())
+    return RigRecordError(record, csr_array((0, record.count)), Tolerance(), 1.0)
 
 
-def _at(record: Run, error: RecordError | None, k: Array | None) -> Run:
-    if error is None or k is None:
-        return record
-    return replace(record, distance_m=record.distance_m + error.distance_error_m(k))
+def _moved(records: Sequence[Run], errors: Sequence[RecordError], at: Sequence[Array]) -> list[Run]:
+    """Records at the distances that they were driven at."""
+    return [replace(record, distance_m=record.distance_m + error.distance_error_m(k))
+            for record, error, k in zip(records, errors, at, strict=True)]
 
 
 def _values(found: Fit) -> Array:
@@ -101,58 +102,47 @@ def _whole_predictions(model: DriveModel, values: Array) -> list[Array]:
             for record, one in zip(model.records, model.predict(values), strict=True)]
 
 
-def _from_lags(model: DriveModel, errors: Sequence[RecordError | None]) -> list[Array | None]:
+def _from_lags(model: DriveModel, errors: Sequence[RecordError]) -> list[Array]:
     """Numbers of the distance errors that the lags behind a car with the starting values amount to."""
     predictions = _whole_predictions(model, np.array([one.start for one in model.parameters]))
-    return [None if error is None else error.coefficients_of(offset_by_lag_m(record, prediction))
+    return [error.coefficients_of(offset_by_lag_m(record, prediction))
             for record, error, prediction in zip(model.records, errors, predictions, strict=True)]
 
 
 @dataclass(frozen=True, eq=False)
-class _Shift:
-    """Numbers of the distance errors after a Gauss-Newton step; the information (p, p) that the free numbers lose when
-    these errors are integrated out; and the effective number of parameters of these errors."""
+class _WithPlaces:
+    """Numbers (k,) of the distance errors per run after a Gauss-Newton step together with the free numbers, and the
+    covariance (p, p) of these with the distance errors integrated out."""
 
-    at: list[Array | None]
-    lost: Array
-    freedom: float
+    at: list[Array]
+    covariance: Array
 
 
-def _shift(model: DriveModel, found: Fit, errors: Sequence[RecordError | None], at: Sequence[Array | None]) -> _Shift:
-    """The distance errors after a fit, by one Gauss-Newton step together with the free numbers."""
+def _with_places(model: DriveModel, found: Fit, errors: Sequence[RecordError], at: Sequence[Array]) -> _WithPlaces:
+    """A fit and its distance errors together, linearised: those of each run are eliminated (Schur complement)."""
     predictions, white = _whole_predictions(model, _values(found)), found.white
     parts = np.split(found.sensitivities, np.cumsum([len(one) for one in white])[:-1])
-    information, pull = found.information, found.prior[1].copy()
-    lost = np.zeros_like(information)
-    freedom = 0.0
-    solved: list[Array | None] = []
+    left, pull, freedom, solved = found.information, found.prior[1].copy(), 0.0, []
     for run, (error, k) in enumerate(zip(errors, at, strict=True)):
-        slopes, left = parts[run], white[run]
-        pull += slopes.T @ left
-        if error is None or k is None:
-            solved.append(None)
-            continue
-        record, places = model.records[run], error.places
+        record, places, slopes = model.records[run], error.places, parts[run]
         by_place = (error.slopes(predictions[run])[:places].toarray() * record.read)[:, record.first:]
         columns = found.noise.whiteners[run](found.low_pass.apply(by_place.T))
         prior = error.precision(USUAL)[:places, :places]
-        whole = columns.T @ columns + prior
-        crossed, gradient = columns.T @ slopes, columns.T @ left - prior @ k[:places]
-        both = np.linalg.solve(whole, np.column_stack([crossed, gradient]))
-        freedom += places - float(np.trace(np.linalg.solve(whole, prior)))
-        lost += crossed.T @ both[:, :-1]
-        pull -= crossed.T @ both[:, -1]
-        solved.append(np.asarray(both, float))
-    step = np.linalg.lstsq(information - lost, pull, rcond=None)[0]
-    moved: list[Array | None] = []
-    for error, k, own in zip(errors, at, solved, strict=True):
-        if error is None or k is None or own is None:
-            moved.append(None)
-            continue
-        there = k.copy()
-        there[: error.places] += own[:, -1] - own[:, :-1] @ step
-        moved.append(there)
-    return _Shift(moved, lost, freedom)
+        crossed, gradient = columns.T @ slopes, columns.T @ white[run] - prior @ k[:places]
+        own = np.linalg.solve(columns.T @ columns + prior, np.column_stack([crossed, gradient, prior]))
+        pull += slopes.T @ white[run] - crossed.T @ own[:, len(pull)]
+        left = left - crossed.T @ own[:, : len(pull)]
+        freedom += places - float(np.trace(own[:, len(pull) + 1:]))
+        solved.append(own)
+    step = inverse(left) @ pull
+    moved = [np.append(k[:places] + own[:, len(step)] - own[:, : len(step)] @ step, k[places:])
+             for k, own, places in zip(at, solved, (error.places for error in errors), strict=True)]
+    count = len(found.sensitivities)
+    alone = found.covariance * count / max(count - freedom, 1.0)  # what was fitted to places leaves less
+    scale = np.sqrt(np.diag(alone) / np.maximum(np.diag(inverse(found.information)), 1e-300))
+    covariance = inverse(left) * np.outer(scale, scale)
+    np.fill_diagonal(covariance, np.maximum(np.diag(covariance), np.diag(alone)))
+    return _WithPlaces(moved, covariance)
 
 
 def _refit(model: DriveModel, before: Fit, options: Callable[[DriveModel], FitOptions]) -> Fit:
@@ -166,18 +156,6 @@ def _has_converged(before: Fit, found: Fit) -> bool:
     """Whether no number changed by more than a tenth of its standard error."""
     return all(abs(found.parameters[name] - before.parameters[name]) <= 0.1 * error
                for name, error in found.standard_errors.items())
-
-
-def _with_covariance(found: Fit, places: _Shift) -> Fit:
-    """A fit with its covariance after the distance errors are integrated out."""
-    information = found.information
-    alone = np.linalg.pinv(information, rcond=1e-15, hermitian=True)
-    count = len(found.sensitivities)
-    own = found.covariance * count / max(count - places.freedom, 1.0)  # what was fitted to places leaves less
-    scale = np.sqrt(np.diag(own) / np.maximum(np.diag(alone), 1e-300))
-    covariance = np.linalg.pinv(information - places.lost, rcond=1e-15, hermitian=True) * np.outer(scale, scale)
-    np.fill_diagonal(covariance, np.maximum(np.diag(covariance), np.diag(own)))
-    return replace(found, covariance=covariance)
 
 
 def _with_rounding_noise(found: Fit, first: Fit, model: DriveModel, records: Sequence[Run]) -> Fit:
