@@ -321,8 +321,7 @@ def assessed(run: Run, model: vehicle_file.CarModel, sensor: Sensor, learns_nois
     try:
         ready = estimable(run.rate_hz, run.accel_z_mps2, run.speed_mps, run.distance_m, bounds.SPEED.largest)
     except Unusable as error:
-        file = run.path / drive_file.DRIVE if run.path.is_dir() else run.path
-        raise BadInput(f"{file}{'' if error.sample is None else f':{error.sample + 2}'}: {error}") from None
+        raise BadInput(f"{run.file}{'' if error.sample is None else f':{error.sample + 2}'}: {error}") from None
     if road is not None:
         _check_road(run, ready.distance_m, road, model, warn, anyway)
     try:

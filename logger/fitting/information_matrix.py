@@ -32,6 +32,14 @@ def inverse(information: Array) -> Array:
     return np.asarray(whiten.T @ whiten)
 
 
+def inverse_with_prior(information: Array) -> Array:
+    """The inverse (m, m) of information of which a prior may be all that is known of some direction, many powers of ten
+    below the rest: only what is within rounding counts as nothing."""
+    scale = 1 / np.sqrt(np.maximum(np.diag(information), 1e-300))
+    scaling = np.outer(scale, scale)
+    return np.asarray(scaling * np.linalg.pinv(scaling * information, rcond=1e-15, hermitian=True))
+
+
 def correlation_of(covariance: Array) -> Array:
     """Correlations (m, m) of estimates with this covariance."""
     deviations = np.sqrt(np.maximum(np.diag(covariance), 1e-300))

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 import numpy.typing as npt
@@ -81,7 +82,7 @@ class DriveModel:
         car = compose(vehicle, self.effects)
         self.exact = not (car.bends_laws or car.structure.held)
         self._runs = SimulatedRuns(records, steps_hz(vehicle))
-        self._tracks: dict[tuple[int, tuple[Obstacle, ...]], WheelTracks] = {}
+        self._track_with_obstacles = lru_cache(_KEPT_TRACKS * max(len(records), 1))(_TrackWithObstacles)
 
     def predict(self, values: Array) -> list[Array]:
         """As ``Predictor``: accelerations without the beginnings of the records [m/s2]; as it was measured where
@@ -91,7 +92,7 @@ class DriveModel:
         return [(one if record.usable is None else record.measured_mps2 - record.residual(one))[record.first:]
                 for record, one in zip(self.records, predictions, strict=True)]
 
-    def linearised(self, values: Array) -> tuple[list[Array], list[Array]]:
+    def slopes(self, values: Array) -> list[Array]:
         """As ``Predictor``: differences, to both sides of a number unless it is at a bound."""
         columns = []
         for index, one in enumerate(self.parameters):
@@ -99,7 +100,7 @@ class DriveModel:
             ends = np.clip(values[index] + step * np.array([-1.0, 1.0]), one.low, one.high)
             low, high = (self.predict(np.where(np.arange(len(values)) == index, end, values)) for end in ends)
             columns.append([(there - here) / (ends[1] - ends[0]) for here, there in zip(low, high, strict=True)])
-        return self.predict(values), [np.stack(parts, axis=1) for parts in zip(*columns, strict=True)]
+        return [np.stack(parts, axis=1) for parts in zip(*columns, strict=True)]
 
     def vehicle_with(self, values: Array) -> Vehicle:
         """The vehicle with these values of its free numbers."""
@@ -186,11 +187,7 @@ class DriveModel:
         track, obstacles = self.records[run].track, tuple(road.obstacles.values())
         if not obstacles or not isinstance(track, Track):
             return track
-        if (run, obstacles) not in self._tracks:
-            for old in [*self._tracks][: -_KEPT_TRACKS * len(self.records)]:
-                del self._tracks[old]
-            self._tracks[run, obstacles] = _TrackWithObstacles(track, obstacles)
-        return self._tracks[run, obstacles]
+        return self._track_with_obstacles(track, obstacles)
 
 
 @dataclass(frozen=True, eq=False)

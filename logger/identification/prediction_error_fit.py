@@ -23,7 +23,7 @@ import numpy as np
 
 from logger.arrays import Array
 from logger.dsp.filters import DecimatingLowPass
-from logger.fitting.information_matrix import inverse
+from logger.fitting.information_matrix import inverse_with_prior
 from logger.fitting.levenberg_marquardt import Minimum, minimise
 from logger.identification.identifiability import (
     Finding,
@@ -66,8 +66,8 @@ class Predictor(Protocol):
     def predict(self, values: Array) -> list[Array]:
         """Predictions [(n,), ...] with these values (p,) in the order of ``parameters``."""
 
-    def linearised(self, values: Array) -> tuple[list[Array], list[Array]]:
-        """Predictions [(n,), ...] and their derivatives by each value [(n, p), ...]."""
+    def slopes(self, values: Array) -> list[Array]:
+        """Derivatives of the predictions by each value [(n, p), ...]."""
 
 
 def least_share(model: Predictor) -> float:
@@ -131,6 +131,11 @@ class Fit:
     prior: tuple[Array, Array]
 
     @property
+    def names(self) -> list[str]:
+        """Names of the rows of the covariance."""
+        return list(self.parameters)
+
+    @property
     def standard_errors(self) -> dict[str, float]:
         """By name."""
         return dict(zip(self.parameters, np.sqrt(np.diag(self.covariance)).tolist(), strict=True))
@@ -155,8 +160,8 @@ def fit(model: Predictor, measured: Sequence[Array], options: FitOptions | None 
     """
     problem = _FitProblem(model, measured, options or FitOptions())
     starts = problem.starts()
-    if findings := problem.structural_findings(
-            beside(starts[0], len(problem.free), problem.low, problem.high)):
+    near = beside(starts[0], len(problem.free), problem.low, problem.high)
+    if findings := problem.structural_findings(problem.at(near, problem.plain)):
         raise NotIdentifiable(findings)
     descents = [_descend(problem, start, problem.plain) for start in starts]
     best = descents[int(np.argmin([one.at.cost for one in descents]))]
@@ -204,15 +209,6 @@ class _ResidualsAt:
     plain: list[Array]
 
 
-@dataclass(frozen=True, eq=False)
-class _Linearised:
-    """Predictions at a place and their derivatives (n, p) by coordinates, behind the low-pass, per record."""
-
-    x: Array
-    predictions: list[Array]
-    slopes: list[Array]
-
-
 @dataclass(eq=False)
 class _FitProblem:
     """A model and its measurements."""
@@ -234,7 +230,7 @@ class _FitProblem:
             raise ValueError("expected measurements that vary, found nothing but 0")
         self.floor = least_share(self.model) * float(np.sqrt(np.mean(np.concatenate(self.observed) ** 2)))
         self.plain = White().fitted(self.observed, np.empty(0), self.low_pass, self.floor)
-        self._linearised: _Linearised | None = None
+        self._slopes: tuple[Array, list[Array]] = np.full(len(self.free), np.nan), []
         known = [one.known or (one.start or 1.0, np.inf) for one in self.free]
         values, shares = (np.array(column) for column in zip(*known, strict=True))
         self.mean = self.coordinates.of(values)
@@ -255,34 +251,29 @@ class _FitProblem:
 
     def at(self, x: Array, noise: Whitening) -> _ResidualsAt:
         """The residuals at a place, weighed by a noise model."""
-        predictions = self._filtered(self.model.predict(self.coordinates.values(x)))
-        plain = [seen - one for seen, one in zip(self.observed, predictions, strict=True)]
+        predictions = self.model.predict(self.coordinates.values(x))
+        if [len(one) for one in predictions] != [len(one) for one in self.measured]:
+            raise ValueError("expected measurements as long as the predictions")
+        plain = [seen - self.low_pass.apply(one) for seen, one in zip(self.observed, predictions, strict=True)]
         white = noise(plain)
         cost = 0.5 * float(white @ white + self.pull(x) @ (self.mean - x))
         return _ResidualsAt(x, cost, white, plain)
 
-    def linearised(self, x: Array) -> _Linearised:
-        """Predictions and derivatives at a place; of the one that was asked for last they are known."""
-        known = self._linearised
-        if known is None or not np.array_equal(known.x, x):
+    def slopes(self, x: Array) -> list[Array]:
+        """Derivatives (n, p) of the predictions by coordinates at a place, behind the low-pass, per record; those of
+        the place that was asked for last are known."""
+        if not np.array_equal(self._slopes[0], x):
             values = self.coordinates.values(x)
-            predictions, slopes = self.model.linearised(values)
             scale = self.coordinates.slopes(values)
-            known = _Linearised(x, self._filtered(predictions), [self.low_pass.apply(one) * scale for one in slopes])
-            self._linearised = known
-        return known
+            self._slopes = x, [self.low_pass.apply(one) * scale for one in self.model.slopes(values)]
+        return self._slopes[1]
 
-    def _filtered(self, predictions: Sequence[Array]) -> list[Array]:
-        if [len(one) for one in predictions] != [len(one) for one in self.measured]:
-            raise ValueError("expected measurements as long as the predictions")
-        return [self.low_pass.apply(one) for one in predictions]
-
-    def structural_findings(self, x: Array) -> list[Finding]:
+    def structural_findings(self, point: _ResidualsAt) -> list[Finding]:
         """What no such data could determine at a place."""
-        here = self.linearised(x)
-        size = float(np.sqrt(sum((one**2).sum() for one in here.predictions)))
+        size = float(np.sqrt(sum(((seen - left)**2).sum() for seen, left in zip(
+            self.observed, point.plain, strict=True))))
         known = size * np.diag(self.precision > 0)
-        return structural([one.name for one in self.free], np.concatenate([*here.slopes, known]), size)
+        return structural([one.name for one in self.free], np.concatenate([*self.slopes(point.x), known]), size)
 
 
 # --- descent ---
@@ -295,7 +286,7 @@ def _descend(problem: _FitProblem, start: Array, noise: Whitening) -> Minimum[_R
     def normal_equations(x: Array, point: _ResidualsAt, fresh: bool) -> tuple[Array, Array]:
         nonlocal slopes
         if fresh:
-            slopes = noise(problem.linearised(x).slopes)
+            slopes = noise(problem.slopes(x))
         return slopes.T @ point.white + problem.pull(x), slopes.T @ slopes + np.diag(problem.precision)
 
     # A step of so small a share of a standard error gains half its square in units of the residuals' variance.
@@ -331,13 +322,13 @@ def _innovations(problem: _FitProblem, point: _ResidualsAt) -> tuple[Whitening, 
 def _result(problem: _FitProblem, point: _ResidualsAt, noise: Whitening, iterations: int, settled: bool,
             ends: Array) -> Fit:
     names = [one.name for one in problem.free]
-    slopes = noise(problem.linearised(point.x).slopes)
+    slopes = noise(problem.slopes(point.x))
     relative = _covariance(problem, point, slopes)
     at_bound = [one.name for one, x, low, high in zip(problem.free, point.x, problem.low, problem.high, strict=True)
                 if (x - low < _AT_BOUND and not (one.may_be_0 and one.low == 0)) or high - x < _AT_BOUND]
     values = problem.coordinates.values(point.x)
     weakest = [one.weakest_at(value) for one, value in zip(problem.free, values, strict=True)]
-    if findings := (problem.structural_findings(point.x) or statistical(names, relative, np.array(weakest))
+    if findings := (problem.structural_findings(point) or statistical(names, relative, np.array(weakest))
                     or unexplained(normalised_rms(point.plain, problem.observed))):
         raise NotIdentifiable(findings)
     scale = problem.coordinates.slopes(values)
@@ -360,4 +351,4 @@ def _covariance(problem: _FitProblem, point: _ResidualsAt, slopes: Array) -> Arr
     """Covariance (p, p) of the coordinates, from the information matrix and the scatter of the white residuals."""
     count, p = slopes.shape
     variance = float(point.white @ point.white) / max(count - p, 1)
-    return variance * inverse(slopes.T @ slopes + variance * np.diag(problem.precision))
+    return variance * inverse_with_prior(slopes.T @ slopes + variance * np.diag(problem.precision))

@@ -1,8 +1,7 @@
-"""A fit from records to numbers: records that can be used, starts that are looked for, and the right way up.
+"""A fit from records to numbers: starts that are looked for, and the right way up.
 
-Problem: before and after a fit there are questions that no optimiser answers. Can these records be what they say? Where
-does a bump lie of which only the kind is known? Is the sensor upside down? Solution: each is a function of arrays here;
-what is wrong with one run is raised as ``UnusableRun`` with its number, so that a caller can name its file.
+Problem: before and after a fit there are questions that no optimiser answers. Where does a bump lie of which only the
+kind is known? Is the sensor upside down? Solution: each is a function of arrays here.
 
 An obstacle is "easily located" (4.4.5 of Blum 2015). A fit goes downhill, and an obstacle that is laid a car's length
 away from the real one has the real one behind a hill. Solution: it is laid at every place in turn, with the height that
@@ -19,8 +18,6 @@ from typing import Any
 import numpy as np
 
 from logger.arrays import Array
-from logger.dsp.filters import DecimatingLowPass
-from logger.dsp.repeated_samples import find_repeats
 from logger.identification.drive_model import DriveModel
 from logger.identification.identifiability import WEAK, NotIdentifiable, upside_down
 from logger.identification.noise_models import Autoregressive, NoiseModel, RoadNoise, White
@@ -28,7 +25,7 @@ from logger.identification.prediction_error_fit import Fit, FitOptions, fit, spr
 from logger.identification.unknown_inputs import EACH, RoadInput, expanded
 from logger.identification.unknown_road.road_operator import RoadDrive
 from logger.profiles.track import Track
-from logger.runs import READING, Run, normalised_rms
+from logger.runs import Run, normalised_rms
 from logger.vehicle.models import structure_of
 from logger.vehicle.vehicle import Vehicle
 
@@ -88,49 +85,20 @@ def _best_place(vehicle: Vehicle, flat: Run, left: Array, road: RoadInput, part:
 
 
 LEAST_SAMPLES = 50
-_SAME_RATE = 1e-6
-# A mean beyond this is gravity [m/s2]; a fit that leaves more than this share is tried with the record turned over.
-_LARGEST_MEAN_MPS2, _POOR = 2.0, 0.3
+# A fit that leaves more than this share is tried with the record turned over.
+_POOR = 0.3
 # How much of a road that was not measured is enough, and not too much, for one fit [m].
 _LEAST_WAY_M, _MOST_WAY_M = 20.0, 20_000.0
 
 
-class UnusableRun(ValueError):
-    """A run that cannot be fitted; ``run``: its number, counted from 0."""
-
-    def __init__(self, run: int, message: str) -> None:
-        super().__init__(message)
-        self.run = run
-
-
-def check_records(records: Sequence[Run]) -> None:
-    """``UnusableRun`` for an acceleration that never changes, that gravity is in, or whose samples repeat."""
-    for run, record in enumerate(records):
-        if not np.ptp(record.kept_mps2) > 0:
-            raise UnusableRun(run, f"expected an acceleration that varies, found {record.kept_mps2[0]:g} m/s2 "
-                                   "throughout")
-        mean_mps2 = float(record.measured_mps2.mean())
-        if record.facts.main.measures == "acceleration" and abs(mean_mps2) > _LARGEST_MEAN_MPS2:
-            raise UnusableRun(run, f"expected gravity removed from the acceleration, found {mean_mps2:.2f} m/s2 on "
-                                   "average (subtract the mean while the car stood)")
-        whole = slice(None) if record.usable is None else record.usable[record.first:] == READING
-        if record.facts.main.never_repeats and (repeats := find_repeats(record.kept_mps2[whole][:, None])):
-            raise UnusableRun(run, f"{repeats.complaint}: write a record only as often as the sensor is read")
-
-
-def off_rate(rates_hz: Sequence[float]) -> int | None:
-    """The first run whose samples a second are not those of the first run; None: all are."""
-    return next((run for run, rate_hz in enumerate(rates_hz) if abs(rate_hz / rates_hz[0] - 1) > _SAME_RATE), None)
-
-
 def drives_of(records: Sequence[Run]) -> list[RoadDrive]:
-    """The records without their roads. ``UnusableRun`` for a way that is too short or too long."""
-    drives = []
-    for run, record in enumerate(records):
-        drives.append(RoadDrive(record.rate_hz, record.kept_mps2, record.distance_m[record.first:]))
-        length_m = float(drives[-1].distance_m.max() - drives[-1].distance_m.min())
+    """The records without their roads. ValueError for a way that is too short or too long."""
+    drives = [RoadDrive(one.rate_hz, one.kept_mps2, one.distance_m[one.first:]) for one in records]
+    for drive, record in zip(drives, records, strict=True):
+        length_m = float(np.ptp(drive.distance_m))
         if not _LEAST_WAY_M <= length_m <= _MOST_WAY_M:
-            raise UnusableRun(run, f"expected {_LEAST_WAY_M:g} to {_MOST_WAY_M:g} m of driving, found {length_m:g} m")
+            raise ValueError(f"{record.name}: expected {_LEAST_WAY_M:g} to {_MOST_WAY_M:g} m of driving, found "
+                             f"{length_m:g} m")
     return drives
 
 
@@ -151,20 +119,12 @@ def fit_options(model: DriveModel, noise: str, low_pass_hz: float | None, tries:
     noise          noise model: white, ar, road, or auto, the likeliest of them
     low_pass_hz    what lies above is left out [Hz]; None: nothing is
     tries          so many further starts
-
-    ``UnusableRun`` for a record that is too short for the low pass.
     """
-    rate_hz = model.records[0].rate_hz
-    reach = DecimatingLowPass(rate_hz, low_pass_hz).reach
-    for run, measured in enumerate(model.measured):
-        if len(measured) <= reach:
-            raise UnusableRun(run, f"expected more than {reach} samples for a low pass of {low_pass_hz:g} Hz, found "
-                                   f"{len(measured)} after the first {model.records[run].skip_s:g} s")
     kinds: dict[str, NoiseModel] = {"white": White(), "ar": Autoregressive(), "road": RoadNoise(model.road_spectra)}
     if any(record.timed for record in model.records):
         del kinds["road"]
     trials = model.trials()
-    return FitOptions(rate_hz=rate_hz, low_pass_hz=low_pass_hz,
+    return FitOptions(rate_hz=model.records[0].rate_hz, low_pass_hz=low_pass_hz,
                    noise=list(kinds.values()) if noise == "auto" else [kinds[noise]],
                    starts=[*trials, *(likely_starts(model) if trials else ()),
                            *spread_starts(model.parameters, tries)])

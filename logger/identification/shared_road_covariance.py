@@ -21,7 +21,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from logger.arrays import Array, Complex
-from logger.fitting.information_matrix import inverse
+from logger.fitting.information_matrix import inverse_with_prior
 from logger.identification.drive_model import DriveModel
 from logger.identification.noise_models import ROAD_LEVEL, PredictionWhitener
 from logger.identification.prediction_error_fit import Fit
@@ -73,7 +73,7 @@ def with_common_roughness(model: DriveModel, fit: Fit) -> CommonRoughness:
         return alone
     share = min(likeness / size, 1.0)
     scale = Coordinates(fit.free).slopes(values)
-    independent = inverse(fit.sensitivities.T @ fit.sensitivities)
+    independent = inverse_with_prior(fit.sensitivities.T @ fit.sensitivities)
     wider = fit.covariance + share * np.outer(scale, scale) * (independent @ crossed @ independent)
     alone_variances = np.diag(fit.covariance)
     variances = np.maximum(np.diag(wider), alone_variances)

@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from logger.arrays import Array
-from logger.fitting.information_matrix import inverse
+from logger.fitting.information_matrix import inverse_with_prior
 from logger.identification.drive_model import DriveModel
 from logger.identification.prediction_error_fit import Fit, FitOptions
 from logger.identification.session import fit_down_to_0, upright_fit
@@ -134,13 +134,13 @@ def _with_places(model: DriveModel, found: Fit, errors: Sequence[RecordError], a
         left = left - crossed.T @ own[:, : len(pull)]
         freedom += places - float(np.trace(own[:, len(pull) + 1:]))
         solved.append(own)
-    step = inverse(left) @ pull
+    step = inverse_with_prior(left) @ pull
     moved = [np.append(k[:places] + own[:, len(step)] - own[:, : len(step)] @ step, k[places:])
              for k, own, places in zip(at, solved, (error.places for error in errors), strict=True)]
     count = len(found.sensitivities)
     alone = found.covariance * count / max(count - freedom, 1.0)  # what was fitted to places leaves less
-    scale = np.sqrt(np.diag(alone) / np.maximum(np.diag(inverse(found.information)), 1e-300))
-    covariance = inverse(left) * np.outer(scale, scale)
+    scale = np.sqrt(np.diag(alone) / np.maximum(np.diag(inverse_with_prior(found.information)), 1e-300))
+    covariance = inverse_with_prior(left) * np.outer(scale, scale)
     np.fill_diagonal(covariance, np.maximum(np.diag(covariance), np.diag(alone)))
     return _WithPlaces(moved, covariance)
 

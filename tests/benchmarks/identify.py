@@ -155,7 +155,7 @@ def bounds(record: Run) -> tuple[Array, Array]:
         return np.asarray(toeplitz((np.fft.irfft(spectrum, GRID) * RATE_HZ / 2)[:count]))
 
     factor = cho_factor(covariance(truth))
-    slopes = model.linearised(truth)[1][0] * truth
+    slopes = model.slopes(truth)[0] * truth
     mean = slopes.T @ cho_solve(factor, slopes)
     step = 1e-3
     ends = [(covariance(truth * (1 + step * unit)), covariance(truth * (1 - step * unit))) for unit in np.eye(3)]
@@ -218,7 +218,7 @@ def unknown_bump(figures: Figures) -> None:
     known = RoadInput(bump=Bump(2.0, 0.15, 2.6))
     model = DriveModel(CAR, [free(CAR, MASS), *(free_input(known, name) for name in list(truth)[1:])], records[:1],
                          known)
-    slopes = model.linearised(np.array(list(truth.values())))[1][0]
+    slopes = model.slopes(np.array(list(truth.values())))[0]
     bound = NOISE_MPS2 * np.sqrt(np.diag(np.linalg.inv(slopes.T @ slopes)))
     judged(figures, "bump unknown", np.array(errors), np.array(expected), bound)
     figures.at_most("bump unknown: error of the mass, rms", 100 * rms([one[0] / 875 for one in errors]), 0.5, "%")

@@ -120,16 +120,16 @@ def other_run(run: str, folder: Path, change: Callable[[Array], Array]) -> str:
 
 
 @pytest.mark.parametrize(("change", "message"), [
-    (lambda z: 0 * z, "expected an acceleration that varies, found 0 m/s2 throughout"),
-    (lambda z: 0 * z - 0.4, "expected an acceleration that varies, found -0.4 m/s2 throughout"),
+    (lambda z: 0 * z, "expected accelerations after the first 2 s, found zeros only"),
+    (lambda z: 0 * z - 0.4, "expected accelerations after the first 2 s, found -0.4 m/s2 throughout"),
     (lambda z: np.repeat(np.round(z[::3], 3), 3)[: len(z)], "expected every sample to be a new measurement, found "
                                                             "6[0-9]%"),
-    (lambda z: z + 9.81, "expected gravity removed from the acceleration, found 9.8[0-9] m/s2 on average"),
-    (lambda z: -z - 9.81, "expected gravity removed from the acceleration, found -9.8[0-9] m/s2 on average"),
+    (lambda z: z + 9.81, "expected gravity to be removed, found 9.8[0-9] m/s2 on average"),
+    (lambda z: -z - 9.81, "expected gravity to be removed, found -9.8[0-9] m/s2 on average"),
 ])
 def test_readings_that_are_none(runs: list[str], tmp_path: Path, change: Callable[[Array], Array],
                                 message: str) -> None:
-    with pytest.raises(BadInput, match=f"{tmp_path.name}/bad: {message}"):
+    with pytest.raises(BadInput, match=f"{tmp_path.name}/bad/drive.csv: {message}"):
         identify([runs[0], other_run(runs[1], tmp_path / "bad", change)], MASS)
 
 

@@ -72,7 +72,7 @@ def test_derivatives_are_those_of_the_prediction(car: Vehicle) -> None:
     single = [name for name in names(car) if "anti_roll" not in name and "both" not in name]
     model = DriveModel(car, [free(car, name) for name in single], [record])
     values = values_of(model)
-    predictions, slopes = model.linearised(values)
+    predictions, slopes = model.predict(values), model.slopes(values)
     assert predictions[0] == pytest.approx(model.predict(values)[0], abs=1e-9)
     for index, name in enumerate(single):
         step = 1e-3 * max(abs(values[index]), 0.1) * (np.arange(len(values)) == index)

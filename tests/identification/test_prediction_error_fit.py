@@ -46,8 +46,8 @@ class Line:
     def predict(self, values: Array) -> list[Array]:
         return [values[0] + values[1] * self.time]
 
-    def linearised(self, values: Array) -> tuple[list[Array], list[Array]]:
-        return self.predict(values), [np.stack([np.ones_like(self.time), self.time], axis=1)]
+    def slopes(self, values: Array) -> list[Array]:
+        return [np.stack([np.ones_like(self.time), self.time], axis=1)]
 
 
 def test_without_noise_it_is_the_truth() -> None:

@@ -75,7 +75,8 @@ def found(car: Vehicle, records: list[Run], road: RoadInput, *names: str, **star
 def test_derivatives_at_the_bounds_of_an_obstacle_stay_within_them() -> None:
     road = RoadInput(bump=Bump(2.0, 1.0, 50.0))
     one = model(HALF, [on_flat_road(HALF)], road, HEIGHT, WIDTH)
-    predicted, slopes = one.linearised(np.array([1.0, 50.0]))
+    values = np.array([1.0, 50.0])
+    predicted, slopes = one.predict(values), one.slopes(values)
     np.testing.assert_allclose(slopes[0][:, 0], predicted[0], rtol=1e-5, atol=1e-5 * np.abs(predicted[0]).max())
 
 
@@ -98,7 +99,7 @@ def test_derivatives_are_those_of_the_prediction(car: Vehicle) -> None:
     one = model(car, [record, replace(record, distance_m=record.distance_m + 1)], road,
                 *(name for name in input_names(road) if name != START), "run2.bump.start_m")
     values = np.array([each.start for each in one.parameters])
-    slopes = one.linearised(values)[1]
+    slopes = one.slopes(values)
     for index, number in enumerate(one.parameters):
         step = 1e-4 * (np.arange(len(values)) == index)
         for run, (low, high) in enumerate(zip(one.predict(values - step), one.predict(values + step), strict=True)):

@@ -18,11 +18,12 @@ import numpy as np
 from logger.api.drives import Run, read_run, run_on_road
 from logger.api.identify.question import MEASURED, OBSTACLES, SAME, IdentifyQuestion
 from logger.api.lab.bench import slow_words, word_of
-from logger.api.lab.checks import check_channels, check_decay, check_rate, check_roads, moves_freely, of_rates
+from logger.api.lab.checks import check_channels, check_rate, check_readings, check_roads, moves_freely, of_rates
 from logger.api.shared_fields import each, paths_of
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, check_forces, model_of
 from logger.chart_data import Array, Bars, Chart, Curves, Line
+from logger.dsp.filters import DecimatingLowPass
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput, CheckFailed
 from logger.fitting.information_matrix import correlation_of
 from logger.identification.drive_model import DriveModel
@@ -31,13 +32,10 @@ from logger.identification.noise_models import UNTESTED, Test, autocorrelation, 
 from logger.identification.prediction_error_fit import Fit, FitOptions, least_share
 from logger.identification.session import (
     LEAST_SAMPLES,
-    UnusableRun,
-    check_records,
     drives_of,
     error_before,
     fit_options,
     obstacle_starts,
-    off_rate,
 )
 from logger.identification.shared_road_covariance import CommonRoughness, may_have_common, with_common_roughness
 from logger.identification.unknown_inputs import (
@@ -65,7 +63,7 @@ from logger.runs import Run as Record
 from logger.runs import no_readings, past_of, runs_left_out, zero_is_known
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats import vehicle_file
-from logger.store.formats.drive_file import DRIVE, RUN
+from logger.store.formats.drive_file import RUN
 from logger.store.formats.effect_file import check_on, shipped_effects
 from logger.vehicle.linear_car import AxleResponse
 from logger.vehicle.named_parameters import (
@@ -195,31 +193,21 @@ def _records(drives: Sequence[Run], question: IdentifyQuestion, vehicle: Vehicle
     """Drives with their roads, or on a flat one. BadInput for one too short, or that cannot be what it says, and for
     rates that differ."""
     records = []
-    for drive in drives:
+    for number, drive in enumerate(drives):
         lasts_s, past_s = len(drive.time_s) / drive.rate_hz, past_of(drive.track).value
         if not lasts_s - LEAST_SAMPLES / drive.rate_hz > past_s:
             raise BadInput(f"{drive.path}: expected {LEAST_SAMPLES} samples or more after the first {past_s:g} s, "
                            f"which are left out, found a drive of {lasts_s:g} s")
+        check_readings(drive, drives[:number])
+        check_channels(drive, vehicle)
         zero = 0.0 if zero_is_known(drive.facts.main, drive.track) else float(drive.accel_z_mps2.mean())
-        samples = drive.accel_z_mps2 - zero
-        records.append(Record(str(drive.path), drive.rate_hz, samples, drive.distance_m, drive.speed_mps,
-                              Track(1.0, np.zeros(2)) if drive.track is None else drive.track, past_s,
-                              replace(drive.facts, signals=()), drive.marks(),
-                              left_out=no_readings(drive.usable)))
-    try:
-        check_records(records)
-    except UnusableRun as error:
-        raise BadInput(f"{records[error.run].name}: {error}") from None
-    rates_hz = [record.rate_hz for record in records]
-    if (run := off_rate(rates_hz)) is not None:
-        raise BadInput(f"{records[run].name}: expected {rates_hz[0]:g} samples a second as in {records[0].name}, found "
-                       f"{rates_hz[run]:g}")
-    for drive, record in zip(drives, records, strict=True):
+        record = Record(str(drive.path), drive.rate_hz, drive.accel_z_mps2 - zero, drive.distance_m, drive.speed_mps,
+                        Track(1.0, np.zeros(2)) if drive.track is None else drive.track, past_s,
+                        replace(drive.facts, signals=()), drive.marks(), left_out=no_readings(drive.usable))
         check_forces(vehicle, record.track, str(drive.path / RUN))
         if record.timed:
-            check_rate(drive, drive.path / DRIVE, vehicle)
-        check_decay(drive, drive.path / DRIVE)
-        check_channels(drive, drive.path / DRIVE, vehicle)
+            check_rate(drive, vehicle)
+        records.append(record)
     return [of_rates(record) for record in records] if moves_freely(vehicle) else records
 
 
@@ -242,8 +230,6 @@ def _on_measured_roads(given: Model, records: list[Record], question: IdentifyQu
 
     try:
         found = fit_to_readings(model_of_records, records, lambda one: _options(one, question))
-    except UnusableRun as error:
-        raise BadInput(f"{records[error.run].name}: {error}") from None
     except ValueError as error:
         raise BadInput(f"{records[0].name}: {error}") from None
     except NotIdentifiable as refusal:
@@ -396,9 +382,13 @@ def _free_number(given: vehicle_file.CarModel, road: RoadInput, name: str, start
 
 
 def _options(model: DriveModel, question: IdentifyQuestion) -> FitOptions:
-    half_hz, low_pass_hz = model.records[0].rate_hz / 2, question.low_pass_hz
-    if low_pass_hz is not None and not 0 < low_pass_hz < half_hz:
-        raise question.wrong("low_pass_hz", f" {low_pass_hz:g}: expected above 0 and below {half_hz:g} Hz")
+    rate_hz, low_pass_hz = model.records[0].rate_hz, question.low_pass_hz
+    if low_pass_hz is not None and not 0 < low_pass_hz < rate_hz / 2:
+        raise question.wrong("low_pass_hz", f" {low_pass_hz:g}: expected above 0 and below {rate_hz / 2:g} Hz")
+    reach = DecimatingLowPass(rate_hz, low_pass_hz).reach
+    if short := next((one for one in model.records if one.count - one.first <= reach), None):
+        raise BadInput(f"{short.name}: expected more than {reach} samples for a low pass of {low_pass_hz:g} Hz, found "
+                       f"{short.count - short.first} after the first {short.skip_s:g} s")
     return fit_options(model, question.noise, low_pass_hz, question.tries)
 
 
@@ -432,8 +422,8 @@ def _on_unmeasured_roads(given: Model, records: list[Record], question: Identify
                        f"measured, found {', '.join(one.effect.name for one in given.effects)}")
     try:
         drives = drives_of(records)
-    except UnusableRun as error:
-        raise BadInput(f"{records[error.run].name}: {error}") from None
+    except ValueError as error:
+        raise BadInput(str(error)) from None
     parameters = _free(given, RoadInput(), {}, records, question)
     try:
         car = AxleResponse(given.vehicle, parameters, drives[0].rate_hz)
@@ -443,7 +433,7 @@ def _on_unmeasured_roads(given: Model, records: list[Record], question: Identify
     fit = fit_roads(car, [drives] if one_road else [[drive] for drive in drives], options)
     where = "one road that was not measured" if one_road else "roads that were not measured"
     fitted = car.vehicle_with(np.array(list(fit.parameters.values())))
-    model = vehicle_file.CarModel(fitted, errors=_road_fit_errors(fit),
+    model = vehicle_file.CarModel(fitted, errors=_errors(list(fit.parameters), fit.covariance),
                                   given=given.given or given.vehicle, known=given.known)
     content = Blocks([Lines([*_first_lines(fit, _head(given, len(parameters), records, f"; over {where}", ","),
                                  "rms(residual) / rms(measured) over the most probable road")]),
@@ -451,19 +441,10 @@ def _on_unmeasured_roads(given: Model, records: list[Record], question: Identify
             _left_out_lines(records)])
     cannot_tell = [finding.words for finding in fit.verdict]
     return Identification(
-        content, _fit_json(fit, parameters, fit.names) | {
+        content, _fit_json(fit, parameters) | {
             "road": fit.roads, "road_standard_errors": fit.road_errors, "cannot_tell": cannot_tell,
             "runs": [record.name for record in records], **left_out_json(runs_left_out(records))},
         fit, model_of(model), tuple(cannot_tell))
-
-
-def _road_fit_errors(fit: RoadFit) -> NumberErrors:
-    """Of the car's numbers, whose covariance holds shares of sizes."""
-    kept = [fit.names.index(name) for name in fit.parameters]
-    relative = fit.covariance[np.ix_(kept, kept)]
-    errors = np.array([fit.standard_errors[name] for name in fit.parameters])
-    units = errors / np.sqrt(np.maximum(np.diag(relative), 1e-300))
-    return NumberErrors.of_covariance(list(fit.parameters), relative * np.outer(units, units))
 
 
 def _road_options(question: IdentifyQuestion) -> tuple[RoadOptions, IdentifyQuestion]:
@@ -506,7 +487,7 @@ def tests(model: DriveModel, fit: Fit) -> tuple[Test, Test]:
 
 def measured_json(fit: Fit, white: Test, free_of_road: Test) -> dict[str, Any]:
     """All of it for a program; null where nothing is known."""
-    return _fit_json(fit, fit.free, list(fit.parameters)) | {
+    return _fit_json(fit, fit.free) | {
         "interval_95": {one.name: list(interval(fit, one)) for one in fit.free},
         "noise": {"model": fit.noise.name, **fit.noise.levels},
         "residuals_white_p_value": _p_value(white), "residuals_free_of_road_p_value": _p_value(free_of_road),
@@ -514,15 +495,15 @@ def measured_json(fit: Fit, white: Test, free_of_road: Test) -> dict[str, Any]:
     }
 
 
-def _fit_json(fit: Fit | RoadFit, free: Sequence[Free], names: Sequence[str]) -> dict[str, Any]:
-    """What every fit has; ``names``: of the rows of its covariance."""
+def _fit_json(fit: Fit | RoadFit, free: Sequence[Free]) -> dict[str, Any]:
+    """What every fit has."""
     return {
         "parameters": fit.parameters, "standard_errors": fit.standard_errors,
         "error_before": known_number(fit.error_before), "error_after": known_number(fit.error_after),
         "converged": fit.converged, "start": {one.name: one.start for one in free},
         "bounds": {one.name: [one.low, one.high] for one in free},
-        "correlation": {name: dict(zip(names, row, strict=True))
-                        for name, row in zip(names, correlation_of(fit.covariance).tolist(), strict=True)},
+        "correlation": {name: dict(zip(fit.names, row, strict=True)) for name, row in zip(
+            fit.names, correlation_of(fit.covariance).tolist(), strict=True)},
         "at_bound": fit.at_bound, "iterations": fit.iterations}
 
 
@@ -584,7 +565,7 @@ def measured_lines(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
     """What a person reads below the numbers of a fit over roads that are known."""
     yield from _far_from_file(fit)
     yield f"The residual is modelled as {fit.noise.words}."
-    yield from _correlated(list(fit.parameters), fit)
+    yield from _correlated(fit)
     yield from _checks(white, free_of_road)
     yield from _measured_limits(fit, sound=not any(doubts(fit, white, free_of_road)))
 
@@ -637,15 +618,15 @@ def _table(fit: Fit | RoadFit, free: Sequence[Free]) -> Table:
                  (0, 7))
 
 
-def _pairs(names: Sequence[str], fit: Fit | RoadFit, between: str) -> list[tuple[str, float]]:
+def _pairs(fit: Fit | RoadFit, between: str) -> list[tuple[str, float]]:
     """Each two numbers with the correlation of their errors, the most correlated first."""
-    found = correlation_of(fit.covariance)
+    names, found = fit.names, correlation_of(fit.covariance)
     return sorted(((f"{names[i]}{between}{names[j]}", float(found[i, j]))
                    for i, j in combinations(range(len(names)), 2)), key=lambda pair: -abs(pair[1]))
 
 
-def _correlated(names: Sequence[str], fit: Fit | RoadFit) -> Iterator[str]:
-    if large := [f"{both} {value:+.2f}" for both, value in _pairs(names, fit, " and ") if abs(value) > _MENTIONED]:
+def _correlated(fit: Fit | RoadFit) -> Iterator[str]:
+    if large := [f"{both} {value:+.2f}" for both, value in _pairs(fit, " and ") if abs(value) > _MENTIONED]:
         yield f"Correlated estimates (correlation beyond {_MENTIONED:g}): {'; '.join(large)}."
 
 
@@ -702,7 +683,7 @@ _UNITS = {GD_N0: "cm3", NOISE: "m/s2", OFFSET: "m"}
 
 def unmeasured_lines(fit: RoadFit, free: Sequence[Free]) -> Iterator[str]:
     """What a person reads below the numbers of a fit over roads that were not measured."""
-    yield from _correlated(fit.names, fit)
+    yield from _correlated(fit)
     for finding in fit.verdict:
         yield f"Cannot tell: {finding.words}"
     sizes = [one.name for one in free if one.by_factors]
@@ -720,8 +701,7 @@ _LAGS, _MOST_PAIRS = 50, 12
 def charts(fit: Fit | RoadFit) -> list[Chart]:
     """Of a fit on measured roads the residuals' autocorrelation, with the band that chance stays in; of every fit with
     two numbers or more how they hang together."""
-    names = fit.names if isinstance(fit, RoadFit) else list(fit.parameters)
-    bars = Bars("Correlated estimates", "correlation of their errors", tuple(_pairs(names, fit, ", ")[:_MOST_PAIRS]))
+    bars = Bars("Correlated estimates", "correlation of their errors", tuple(_pairs(fit, ", ")[:_MOST_PAIRS]))
     return [*([_left(fit.white)] if isinstance(fit, Fit) else []), *([bars] if bars.bars else [])]
 
 

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import chain, compress
 from math import log
-from pathlib import Path
 from statistics import median
 
 import numpy as np
@@ -58,7 +57,7 @@ from logger.runs import (
     zero_is_known,
 )
 from logger.simulation.virtual_drive import SimulatedRuns, steps_hz
-from logger.store.formats.drive_file import DRIVE, RUN, Drive
+from logger.store.formats.drive_file import RUN, Drive
 from logger.store.formats.vehicle_file import CarModel
 from logger.units import FOOT_M, LBF_N, STANDARD_GRAVITY_MPS2
 from logger.vehicle.compose import Car, bounded, compose
@@ -363,19 +362,18 @@ def checked_runs(drives: Sequence[Drive], thin: bool = True, vehicle: Vehicle | 
     Raises BadInput for one that is not what ``check_record`` asks for, or stands nowhere on its own profile.
     """
     for number, drive in enumerate(drives):
-        file = drive.path / DRIVE if drive.path.is_dir() else drive.path
         assert drive.track is not None
         if isinstance(drive.track, Track):
             first_m, last_m = float(drive.distance_m.min()), float(drive.distance_m.max())
             if last_m < drive.track.start_m or first_m > drive.track.end_m:
-                raise BadInput(f"{file}: expected distances on the profile, {drive.track.start_m:g} to "
+                raise BadInput(f"{drive.file}: expected distances on the profile, {drive.track.start_m:g} to "
                                f"{drive.track.end_m:g} m, found {first_m:g} to {last_m:g} m")
-        check_record(drive, file, drives[:number], vehicle)
+        check_record(drive, drives[:number], vehicle)
         if not drive.track.timed:
-            check_distances(drive, file)
+            check_distances(drive)
         if vehicle is not None:
             check_forces(vehicle, drive.track, str(drive.path / RUN))
-            check_channels(drive, file, vehicle)
+            check_channels(drive, vehicle)
     runs = [run for one in drives for run in driven_stretches(one)]
     if vehicle is not None and moves_freely(vehicle):
         runs = [of_rates(run) for run in runs]
@@ -417,7 +415,7 @@ def of_rates(run: Run) -> Run:
             replace(one, measures="velocity") if is_place(one) else one for one in facts.signals)))
 
 
-def check_distances(drive: Drive, file: Path) -> None:
+def check_distances(drive: Drive) -> None:
     """Raise BadInput for distances that are none: they fall, leap, or have nothing to do with the speed."""
     distance_m = drive.distance_m
     for wrong, words in (
@@ -426,12 +424,12 @@ def check_distances(drive: Drive, file: Path) -> None:
     ):
         if wrong.any():
             at = int(np.argmax(wrong))
-            raise BadInput(f"{file}:{at + 3}: expected distances {words}, found {distance_m[at + 1]:.6g} m after "
+            raise BadInput(f"{drive.file}:{at + 3}: expected distances {words}, found {distance_m[at + 1]:.6g} m after "
                            f"{distance_m[:at + 1].max():.6g} m")
     way_m, by_speed_m = float(distance_m[-1] - distance_m[0]), float(drive.speed_mps.sum() / drive.rate_hz)
     if abs(way_m - by_speed_m) > _DISAGREE * max(way_m, by_speed_m) + _DISAGREE_M:
-        raise BadInput(f"{file}: expected speed_mps [m/s] and distance_m [m] to agree, found {by_speed_m:.4g} m from "
-                       f"the speed and {way_m:.4g} m from the distance ({likely_unit(by_speed_m, way_m)})")
+        raise BadInput(f"{drive.file}: expected speed_mps [m/s] and distance_m [m] to agree, found {by_speed_m:.4g} m "
+                       f"from the speed and {way_m:.4g} m from the distance ({likely_unit(by_speed_m, way_m)})")
 
 
 def driven_stretches(drive: Drive) -> list[Run]:
@@ -468,15 +466,15 @@ def least_s(drive: Drive, vehicle: Vehicle | None = None) -> float:
     return _LEAST_OF_PART_S if past_of(drive.track) is Past.OF_PART else LEAST_S
 
 
-def check_decay(drive: Drive, file: Path) -> None:
+def check_decay(drive: Drive) -> None:
     """Raise BadInput for a record that does not die down, of a run that nothing drives: what little damps does so from
     swing to swing, though its second half is hardly less than the first."""
     if past_of(drive.track) is Past.FREE:
         half = len(drive.accel_z_mps2) // 2
         first, last = (float(part.std()) for part in (drive.accel_z_mps2[:half], drive.accel_z_mps2[half:]))
         if last > _DIES_DOWN * first and not _swings_shrink(drive.accel_z_mps2):
-            raise BadInput(f"{file}: expected an excitation that moves the rig, or a free decay: nothing drives this "
-                           f"record, yet its second half has {last / max(first, 1e-300):.2g} "
+            raise BadInput(f"{drive.file}: expected an excitation that moves the rig, or a free decay: nothing drives "
+                           f"this record, yet its second half has {last / max(first, 1e-300):.2g} "
                            "times the r.m.s. of the first")
 
 
@@ -495,7 +493,7 @@ def _swings_shrink(samples: Array) -> bool:
 _ORDERS = {"displacement": 0, "travel": 0, "velocity": 1, "acceleration": 2}
 
 
-def check_channels(drive: Drive, file: Path, vehicle: Vehicle) -> None:
+def check_channels(drive: Drive, vehicle: Vehicle) -> None:
     """Raise BadInput for a channel of a rig that was at its end or out for a time, which no column ``usable`` says, and
     for a force of the wrong sign."""
     track, main = drive.track, drive.facts.main
@@ -506,14 +504,14 @@ def check_channels(drive: Drive, file: Path, vehicle: Vehicle) -> None:
     to_judge = read if drive.usable is None or drive.guessed else []
     for signal, samples in ((signal, every[whole]) for signal, every in to_judge):
         if (share := float(at_ends(samples).mean())) > _CLIPPED_SHARE:
-            raise BadInput(f"{file}: {signal.name}: expected readings, found {share:.0%} of them exactly at the "
+            raise BadInput(f"{drive.file}: {signal.name}: expected readings, found {share:.0%} of them exactly at the "
                            "largest or smallest value, as from a saturated amplifier. Set a wider range, or add a "
                            "column usable, 2 there and 1 elsewhere (1 everywhere if this is right)")
         if signal.measures == "force" and (still := longest_still(samples, drive.rate_hz)):
             from_s, to_s = (float(drive.time_s[whole][min(one, len(samples) - 1)]) for one in still)
-            raise BadInput(f"{file}: {signal.name}: expected readings, found {samples[still[0]]:g} from {from_s:.4g} "
-                           f"to {to_s:.4g} s, as from a disconnected cable: add a column usable, 0 there and 1 "
-                           "elsewhere (1 everywhere if this is right)")
+            raise BadInput(f"{drive.file}: {signal.name}: expected readings, found {samples[still[0]]:g} from "
+                           f"{from_s:.4g} to {to_s:.4g} s, as from a disconnected cable: add a column usable, 0 there "
+                           "and 1 elsewhere (1 everywhere if this is right)")
     times_s = track.start_s + np.arange(len(track.elevation_m)) / track.rate_hz
 
     def then(samples: Array) -> Array:
@@ -522,12 +520,12 @@ def check_channels(drive: Drive, file: Path, vehicle: Vehicle) -> None:
     part = track.moves_part and main.measures == "force"
     alone = vehicle.model == "single_mass" and track.acts_on == (("body",),) and main.measures in _ORDERS
     if part and goes_against(drive.accel_z_mps2, then(track.elevation_m), 0, range(2), drive.rate_hz):
-        raise BadInput(f"{file}: {main.name}: expected the force that pulls the part back, positive when it is longer, "
-                       "found the opposite sign: change the sign of the force or of displacement_m")
+        raise BadInput(f"{drive.file}: {main.name}: expected the force that pulls the part back, positive when it is "
+                       "longer, found the opposite sign: change the sign of the force or of displacement_m")
     if alone and track.force_n is not None and goes_against(
             then(track.force_n[:, 0]), drive.accel_z_mps2, _ORDERS[main.measures], range(3), drive.rate_hz):
-        raise BadInput(f"{file}: {main.name}: expected it to follow {track.forces[0].name}, found the opposite sign: "
-                       "change the sign of one of them (both are positive up)")
+        raise BadInput(f"{drive.file}: {main.name}: expected it to follow {track.forces[0].name}, found the opposite "
+                       "sign: change the sign of one of them (both are positive up)")
 
 
 def driven_parts(drive: Drive, on_rig: Bools | None = None) -> list[slice]:
@@ -630,25 +628,31 @@ def _least_hz(drive: Drive, vehicle: Vehicle | None) -> tuple[float, str]:
     return slowest_hz / HIGHEST_OF_RATE, f"its vibration at {slowest_hz:.3g} Hz"
 
 
-def check_rate(drive: Drive, file: Path, vehicle: Vehicle | None) -> None:
+def check_rate(drive: Drive, vehicle: Vehicle | None) -> None:
     """Raise BadInput for a drive of fewer samples a second than what is looked at needs."""
     least_hz, seen = _least_hz(drive, vehicle)
     if drive.rate_hz < (1 - _CLOCK) * least_hz:
-        raise BadInput(f"{file}: expected {least_hz:.4g} samples a second or more, to see {seen}, found "
+        raise BadInput(f"{drive.file}: expected {least_hz:.4g} samples a second or more, to see {seen}, found "
                        f"{drive.rate_hz:.4g}{time_hint(drive.rate_hz)}")
 
 
-def check_record(drive: Drive, file: Path, others: Sequence[Drive], vehicle: Vehicle | None = None) -> None:
+def check_record(drive: Drive, others: Sequence[Drive], vehicle: Vehicle | None = None) -> None:
     """Raise BadInput for a drive of fewer samples a second than what is looked at needs, that is too short, has
     another rate than the others, recorded nothing, or repeats samples."""
-    track = drive.track
-    past_s, shortest_s = past_of(track).value, least_s(drive, vehicle)
-    check_rate(drive, file, vehicle)
+    shortest_s = least_s(drive, vehicle)
+    check_rate(drive, vehicle)
     lasts_s = len(drive.time_s) / drive.rate_hz
     if lasts_s < shortest_s:
-        raise BadInput(f"{file}: expected a record of {shortest_s:.3g} s or longer, found {lasts_s:.3g} s")
+        raise BadInput(f"{drive.file}: expected a record of {shortest_s:.3g} s or longer, found {lasts_s:.3g} s")
+    check_readings(drive, others)
+
+
+def check_readings(drive: Drive, others: Sequence[Drive]) -> None:
+    """Raise BadInput for a drive of another rate than the others, that recorded nothing, or gravity as well, does not
+    die down, or repeats samples."""
+    past_s = past_of(drive.track).value
     if others and abs(drive.rate_hz / others[0].rate_hz - 1) > _SAME_RATE:
-        raise BadInput(f"{file}: expected {others[0].rate_hz:g} samples a second, as in {others[0].path}, found "
+        raise BadInput(f"{drive.file}: expected {others[0].rate_hz:g} samples a second, as in {others[0].path}, found "
                        f"{drive.rate_hz:g}")
     counted = drive.accel_z_mps2[int(past_s * drive.rate_hz):]
     is_acceleration = drive.facts.main.measures == "acceleration"
@@ -656,15 +660,15 @@ def check_record(drive: Drive, file: Path, others: Sequence[Drive], vehicle: Veh
         unit = " m/s2" if is_acceleration else ""
         found = f"{counted[0]:g}{unit} throughout" if counted[0] else "zeros only"
         what = "accelerations" if is_acceleration else drive.facts.main.name
-        raise BadInput(f"{file}: expected {what} after the first {past_s:g} s, found {found}")
-    check_decay(drive, file)
+        raise BadInput(f"{drive.file}: expected {what} after the first {past_s:g} s, found {found}")
+    check_decay(drive)
     if is_acceleration and counted.std() < _RUN_CHECKS_LEAST_MPS2:
-        raise BadInput(f"{file}: expected accelerations in m/s2, found none above {np.abs(counted).max():.2g}")
+        raise BadInput(f"{drive.file}: expected accelerations in m/s2, found none above {np.abs(counted).max():.2g}")
     # Three periods of what rings loudly have a mean of their own.
-    own_mean_mps2 = counted.std() if past_of(track) is Past.FREE else 0.0
+    own_mean_mps2 = counted.std() if past_of(drive.track) is Past.FREE else 0.0
     if is_acceleration and abs(counted.mean()) > max(_MOST_MEAN_MPS2, own_mean_mps2):
-        raise BadInput(f"{file}: expected gravity to be removed, found {counted.mean():.3g} m/s2 on average")
+        raise BadInput(f"{drive.file}: expected gravity to be removed, found {counted.mean():.3g} m/s2 on average")
     # What was laid across gaps is on no step of a coarse sensor, and one at the end of its range rightly stays there.
     read = drive.accel_z_mps2 if drive.usable is None else drive.accel_z_mps2[drive.usable == READING]
     if drive.facts.main.never_repeats and (repeats := find_repeats(read[:, None])):
-        raise BadInput(f"{file}: {repeats.complaint}: write a record only as often as the sensor is read")
+        raise BadInput(f"{drive.file}: {repeats.complaint}: write a record only as often as the sensor is read")

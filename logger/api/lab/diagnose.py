@@ -202,9 +202,8 @@ def records_of(drives: Sequence[tuple[drive_file.Drive, str]]) -> list[Record]:
         raise BadInput("expected two runs or more over one road, found one")
     flat = Track(1.0, np.zeros(2))
     for number, (drive, _) in enumerate(drives):
-        file = drive.path / drive_file.DRIVE if drive.path.is_dir() else drive.path
-        check_record(drive, file, [one for one, _ in drives[:number]])
-        check_distances(drive, file)
+        check_record(drive, [one for one, _ in drives[:number]])
+        check_distances(drive)
     by_receiver = any(one.facts.places_by == BY_RECEIVER for one, _ in drives)
     # Extracted without a profile, a drive's distance begins where it did.
     if all(_was_extracted(one) for one, _ in drives) and any(one.facts.places_by is None for one, _ in drives):

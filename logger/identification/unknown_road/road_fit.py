@@ -9,7 +9,7 @@ import numpy as np
 
 from logger.arrays import Array
 from logger.fitting.fisher_scoring import Maximum, maximise
-from logger.fitting.information_matrix import inverse
+from logger.fitting.information_matrix import correlation_of, inverse
 from logger.identification.identifiability import (
     APART,
     NOT_ONE_ROAD,
@@ -52,7 +52,7 @@ class RoadFit:
     roads              their numbers, by name, and the noise's; ``road_errors`` alike. ``place_offset_m`` is to be added
                        to a drive's distances for the first one's, and ``distance_scale`` times its distances from its
                        middle are the first one's
-    covariance         (m, m) of all of them, relative for sizes
+    covariance         (m, m) of all of them
     names              (m,)
     elevations         the most probable elevations of each road on its grid [m]
     grids              of the roads
@@ -156,10 +156,11 @@ class RoadProblem:
         own = self.names[:p]
         at_bound = [name for name, one, low, high in zip(own, x, self.low, self.high, strict=False)
                     if min(one - low, high - one) < 1e-6]
-        errors = np.abs(self._scale(x)[:p]) * deviations[:p]
-        return RoadFit(dict(zip(own, values.tolist(), strict=True)), dict(zip(own, errors.tolist(), strict=True)),
-                       roads, road_errors, relative, self.names, elevations, [road.grid for road in self.roads.roads],
-                       before, here.error, findings, climbed.converged, climbed.steps, at_bound)
+        errors = np.append(np.abs(self._scale(x)[:p]) * deviations[:p], list(road_errors.values()))
+        return RoadFit(dict(zip(own, values.tolist(), strict=True)), dict(zip(own, errors[:p].tolist(), strict=True)),
+                       roads, road_errors, correlation_of(relative) * np.outer(errors, errors), self.names, elevations,
+                       [road.grid for road in self.roads.roads], before, here.error, findings, climbed.converged,
+                       climbed.steps, at_bound)
 
     def _apart(self, x: Array) -> list[Finding]:
         """Whether drives that are said to be over one road disagree on it."""

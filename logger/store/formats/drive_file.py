@@ -253,6 +253,11 @@ class Drive:
         """The road, or the excitation of a rig; None: not known."""
         return None
 
+    @property
+    def file(self) -> Path:
+        """Of its samples."""
+        return self.path / DRIVE if self.path.is_dir() else self.path
+
     def marks(self, part: slice = slice(None)) -> Array | None:
         """``usable`` of a part; None where all of it are readings."""
         return None if self.usable is None or (self.usable[part] == READING).all() else self.usable[part]
