@@ -397,17 +397,13 @@ class Improved:
             "effect", "number", "found .5g", "its standard error .2g"),
             tuple(rows) or (("nothing", "", None, None),))
 
-    def standard_error(self, name: str) -> float | None:
-        """Of a number of the rig, with all effects."""
-        return next((one.standard_error for step in self.added[-1:] for one in step.numbers if one.name == name), None)
-
 
 def improved(vehicle: Path, runs: Sequence[Path]) -> Improved:
     """What the lab makes of a rig: ``diagnose`` once, then ``add-effect`` for each that it names, kept if it helps."""
     diagnosis = diagnose(vehicle, runs)
     model, refitted, added = read_vehicle(vehicle), None, list[AddedEffect]()
-    for name in diagnosis.verdict:
-        found = add_effect(name, model, runs)
+    for one in diagnosis.found.missing:
+        found = add_effect(one.effect.name, model, runs, start=one.refined)
         refitted = refitted or model.with_numbers({one.name: one.without for one in found.numbers})
         if found.helps:
             model = found.model

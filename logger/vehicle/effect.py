@@ -436,6 +436,11 @@ class Chosen:
         return all(self.values.get(name, usual[name]) == usual[name] for name in self.effect.refinements)
 
     @property
+    def refined(self) -> dict[str, float]:
+        """Values of its refinements by name; empty: it is in its plain form."""
+        return {} if self.is_plain else {name: self.values[name] for name in self.effect.refinements}
+
+    @property
     def is_refined_too_far(self) -> bool:
         """Whether a refinement is at an end of its range, where nothing of it was measured."""
         usual = self.effect.usual

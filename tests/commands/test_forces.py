@@ -2,6 +2,7 @@
 which shares nothing with ridelog."""
 
 import json
+import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
@@ -447,23 +448,26 @@ def test_the_low_pass_of_a_load_cell_is_found(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_knees_that_differ_by_direction_are_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_knees_that_differ_by_direction_are_found_and_added(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                                            capsys: pytest.CaptureFixture[str]) -> None:
     """Valves of a damper in rebound and in bump: 2400 N s/m up to 0.12 m/s and then 0.3 of it, 1000 up to 0.2 and then
-    0.4."""
+    0.4. The command that diagnose prints adds the effects in the form in which it found them."""
     way = noise(4.0, 0.012, 6)
     rate_mps = way(TIME_S, 1)
     force_n = np.where(rate_mps > 0, 2400 * (np.minimum(rate_mps, 0.12) + 0.3 * np.maximum(rate_mps - 0.12, 0)),
                        1000 * (np.maximum(rate_mps, -0.2) + 0.4 * np.minimum(rate_mps + 0.2, 0)))
     force_n += np.random.default_rng(1).normal(0.0, 1.0, len(force_n))
-    run = written(tmp_path / "run", {"force_n": force_n}, {"displacement_m": way(TIME_S)}, "source: me\n")
+    written(tmp_path / "run", {"force_n": force_n}, {"displacement_m": way(TIME_S)}, "source: me\n")
     (tmp_path / "part.yaml").write_text("name: part\nmodel: component\nstiffness_n_per_m: 0 +- 2000\n"
                                         "damping_n_s_per_m: 1500 +- 50%\npreload_n: unknown\n")
-    assert main(["diagnose", "--vehicle", str(tmp_path / "part.yaml"), str(run), "--json"]) == 0
+    monkeypatch.chdir(tmp_path)
+    assert main(["diagnose", "--vehicle", "part.yaml", "run"]) == 0
+    *_, following = capsys.readouterr().out.split("Next: ridelog ")
+    assert main([*shlex.split(following), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
-    assert sorted(found["verdict"]) == ["damper_asymmetry", "damper_blow_off"]
-    by_name = {one["effect"]: one["parameters"] for one in found["candidates"]}
-    assert by_name["damper_asymmetry"]["rebound_to_bump_ratio"] == pytest.approx(2.4, rel=0.02)
-    assert by_name["damper_blow_off"]["rebound_to_bump_knee_ratio"] == pytest.approx(0.6, rel=0.02)
+    assert found["parameters"]["damper_asymmetry.rebound_to_bump_ratio"] == pytest.approx(2.4, rel=0.02)
+    assert found["parameters"]["damper_blow_off.rebound_to_bump_knee_ratio"] == pytest.approx(0.6, rel=0.02)
+    assert found["error_after"] < 1.1 * found["noise_floor_error"]
 
 
 @pytest.mark.slow

@@ -158,9 +158,9 @@ def _compared(bench: Bench) -> str:
 
 def _next(question: DiagnoseQuestion, bench: Bench, found: LabDiagnosis) -> str:
     if found.missing:
-        names = [one.effect.name for one in found.missing]
-        asked = "+".join(bench.files.get(one, one) for one in names)
-        return "Next: " + question.command(f"add-effect {asked} {{}} --out with-{'-'.join(names)}.yaml")
+        asked = "+".join(_asked(bench.files.get(one.effect.name, one.effect.name), one) for one in found.missing)
+        names = "-".join(one.effect.name for one in found.missing)
+        return "Next: " + question.command(f"add-effect {asked} {{}} --out with-{names}.yaml")
     if found.beyond and not found.exceeds_noise:
         words = (f"Next: check {', '.join(found.beyond)} in the vehicle's file. This command fits them to the runs "
                  "alone:")
@@ -169,6 +169,12 @@ def _next(question: DiagnoseQuestion, bench: Bench, found: LabDiagnosis) -> str:
         return wrapped(["Next: look at the shape above. An effect of your own is one Python file (--effect-file); "
                            "ridelog compare shows where the residual is."])
     return "Next: nothing. Runs that excite the effects listed as undetected would test the model further."
+
+
+def _asked(name: str, one: Chosen) -> str:
+    """An effect as an argument of add-effect: with its refinements, which only that frees."""
+    values = ",".join(f"{each}={value:.3g}" for each, value in one.refined.items())
+    return f"{name}:{values}" if values else name
 
 
 # --- without a profile ---

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from logger.api import data_sets
+from logger.api.lab.compare import AddedEffect
 from logger.chart_data import Array
 from logger.errors import BadInput
 from logger.files import write_text
@@ -50,11 +51,10 @@ def run(folder: Path, effort: Workload) -> Result:
     skip = round(_SKIP_S * made.rate_hz)
     size = float(np.sqrt(np.mean(made.measured[skip:] ** 2)))
     linear, better = (made.rms(one, skip) / size for one in (made.linear, made.better))
-    friction = {one.effect: one for one in found.added}.get(EFFECT)
-    numbers = found.best.numbers
-    ours = (numbers["mass_kg"], numbers["damping_n_s_per_m"],
-            friction.parameters[FRICTION] if friction else 0.0)
-    return Result((_beside(found, ours), found.effects), _verdict(found, linear, better),
+    first = found.added[0] if found.added else None
+    numbers = (first.model if first else found.best).numbers
+    ours = (numbers["mass_kg"], numbers["damping_n_s_per_m"], first.parameters.get(FRICTION, 0.0) if first else 0.0)
+    return Result((_beside(first, ours), found.effects), _verdict(found, linear, better),
                   data_sets.pictures("Force of the axis", made, "N", _SHOWN_S, skip), (
         Statement("dry_friction is named first (1: yes)", "Coulomb friction",
                   float(found.diagnosis.verdict[:1] == (EFFECT,)), 1, 1, of=("EMPS friction",)),
@@ -79,13 +79,12 @@ def _verdict(found: data_sets.Improved, linear: float, better: float) -> str:
             f"{linear:.3f} with mass and viscous friction alone.")
 
 
-def _beside(found: data_sets.Improved, ours: Sequence[float]) -> Table:
-    """Published numbers and ours with standard errors."""
-    friction = next((one for one in found.added if one.effect == EFFECT), None)
-    errors = (found.standard_error("mass_kg"), found.standard_error("damping_n_s_per_m"),
-              friction.standard_errors.get(FRICTION) if friction else None)
+def _beside(first: AddedEffect | None, ours: Sequence[float]) -> Table:
+    """Published numbers and those with friction alone, as the published model has it."""
+    errors = {one.name: one.standard_error for one in first.numbers} | dict(first.standard_errors) if first else {}
     rows = tuple((name, printed, value, error, 100 * (value / printed - 1))
-                 for (name, printed), value, error in zip(PUBLISHED, ours, errors, strict=True))
+                 for (name, printed), value, error in zip(PUBLISHED, ours, map(errors.get, (
+                     "mass_kg", "damping_n_s_per_m", FRICTION)), strict=True))
     return Table("Parameters of the axis", ("parameter", "published .5g", "ridelog .5g", "its standard error .2g",
                                             "difference [%] +.1f"), rows)
 
@@ -94,7 +93,8 @@ _DOWNLOAD = "download the EMPS files from nonlinearbenchmark.org and unpack them
 STUDY = Study(
     "emps", "A linear axis with friction: what its model lacks", "Parameters of the axis",
     "The training record is written as a user would write it: a component that its bench moves (the encoder's "
-    "position) while its force is measured. The file knows the mass to 20 % and viscous friction to 50 %.",
+    "position) while its force is measured. The file knows the mass to 20 % and viscous friction to 50 %. "
+    "Published parameters are compared with those found with friction alone, as in the published model.",
     data_sets.rig_from_folder("the EMPS record", _DOWNLOAD, run),
     (Item("EMPS friction", Word.AGREES, "diagnose names Coulomb friction, which halves the error of the force."),
      Item("EMPS parameters", Word.AGREES, "Mass, viscous and Coulomb friction within 1 %.")),
