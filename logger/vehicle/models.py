@@ -13,6 +13,7 @@ axle rolls against the body by (x_left - x_right) / b, and the bar stores 1/2 k 
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 
@@ -75,6 +76,7 @@ MODELS = {"single_mass": single_mass, "component": component, "quarter_car": qua
           "full_car": full_car}
 
 
+@lru_cache(maxsize=16)  # effects of laws and sensors leave it as it is
 def structure_of(vehicle: Vehicle) -> Structure:
     """The matrices of a vehicle by the model it names. ValueError if it lacks what its model needs."""
     return MODELS[vehicle.model](vehicle)

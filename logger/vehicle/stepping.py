@@ -54,6 +54,7 @@ def begun(at_rest: Array, begins: Array) -> Array:
     return at_rest + begins[: len(at_rest)] if len(begins) else at_rest
 
 
+@lru_cache(maxsize=16)
 def static_tire_loads_n(structure: Structure) -> Array:
     """What each tire carries at rest (w,) [N]."""
     if not structure.tires.any():
@@ -94,30 +95,10 @@ class Stepper:
     @staticmethod
     def of(structure: Structure, laws: Sequence[CornerLaws], step_s: float) -> Stepper:
         """Of laws, one per wheel. ValueError for one by all that moves that cannot be compiled."""
-        from logger.vehicle.stepping_loop import LANES  # loads the compiler, if there is one
-
-        n, w = len(structure.mass), len(structure.wheels)
-        a, b = structure.state_space()
-        u = b.shape[1]
-        transition, at_start, at_end = straight_step(a, np.hstack([b, force_input(structure)]), step_s)
-        inputs = [at_start[:, :u] + at_end[:, :u], at_end[:, :u] - at_start[:, :u]]
-        rubbing = _rubbing(laws, 2 * n)
-        held = (at_start[:, u:] + at_end[:, u:]) @ _onto(rubbing, w)  # dry friction stays the same over a step
-        seen = np.vstack([np.kron(order, rows) for rows in (structure.travel, structure.wheels) for order in np.eye(2)])
-        through = np.zeros((len(seen), u))
-        if structure.on_base:  # from which its place is counted
-            through[2 * w, BASE_INPUTS.index("height")] = through[3 * w, BASE_INPUTS.index("velocity")] = 1.0
-        if any(one.body_friction_n for one in laws):
-            seen = np.vstack([seen, np.kron(np.eye(2)[1], structure.travel + structure.wheels)])
-            through = np.vstack([through, through[w:2 * w] + through[3 * w:]])
-        rest = (-len(seen) - 2 * n) % LANES
-        state_and_seen = np.vstack([np.eye(2 * n), seen, np.zeros((rest, 2 * n))])
-        inputs_seen = np.pad(through, ((2 * n, rest), (0, 0)))
-        known, forces = (
-            np.ascontiguousarray((state_and_seen @ np.hstack(some)).T)
-            for some in ([transition, at_start[:, u:], *inputs], [at_end[:, u:], held])
-        )
-        known[-2 * u:] += np.tile(inputs_seen.T, (2, 1))  # at the end of a step: the mean over it, and the rise
+        w, rubbing = len(structure.wheels), _rubbing(laws, 2 * len(structure.mass))
+        state_and_seen, inputs_seen, known, at_end, held = _without_laws(
+            structure, step_s, any(one.body_friction_n for one in laws))
+        forces = np.ascontiguousarray(np.hstack([at_end, held @ _onto(rubbing, w)]).T)
         rubs = [[one.force_n, one.transition_mps, _looked_at(one, -float(forces[2 * w + i, one.places[0]])),
                  *one.stribeck] for i, one in enumerate(rubbing)]
         return Stepper(
@@ -143,6 +124,33 @@ class Stepper:
             self.by_known, self.by_force, self.step_s, *self.tabulated, self.rubs, self.rubs_at,
             _asked(structure, self.laws, way or stands, begins[2 * n:]),
             self.state_and_seen @ first + self.inputs_seen @ elevation[0], 2 * n, around, elevation))
+
+
+@lru_cache(maxsize=16)
+def _without_laws(structure: Structure, step_s: float, with_ends: bool) -> tuple[Array, Array, Array, Array, Array]:
+    """``state_and_seen``, ``inputs_seen`` and ``by_known`` of a car, with the body's ends of its suspensions or
+    without, and what its motion (R, 2 w) gets from forces at the end of a step, and from ones that stay the same."""
+    from logger.vehicle.stepping_loop import LANES  # loads the compiler, if there is one
+
+    n, w = len(structure.mass), len(structure.wheels)
+    a, b = structure.state_space()
+    u = b.shape[1]
+    transition, at_start, at_end = straight_step(a, np.hstack([b, force_input(structure)]), step_s)
+    inputs = [at_start[:, :u] + at_end[:, :u], at_end[:, :u] - at_start[:, :u]]
+    seen = np.vstack([np.kron(order, rows) for rows in (structure.travel, structure.wheels) for order in np.eye(2)])
+    through = np.zeros((len(seen), u))
+    if structure.on_base:  # from which its place is counted
+        through[2 * w, BASE_INPUTS.index("height")] = through[3 * w, BASE_INPUTS.index("velocity")] = 1.0
+    if with_ends:
+        seen = np.vstack([seen, np.kron(np.eye(2)[1], structure.travel + structure.wheels)])
+        through = np.vstack([through, through[w:2 * w] + through[3 * w:]])
+    rest = (-len(seen) - 2 * n) % LANES
+    state_and_seen = np.vstack([np.eye(2 * n), seen, np.zeros((rest, 2 * n))])
+    inputs_seen = np.pad(through, ((2 * n, rest), (0, 0)))
+    known = np.ascontiguousarray((state_and_seen @ np.hstack([transition, at_start[:, u:], *inputs])).T)
+    known[-2 * u:] += np.tile(inputs_seen.T, (2, 1))  # at the end of a step: the mean over it, and the rise
+    return (state_and_seen, inputs_seen, known, state_and_seen @ at_end[:, u:],
+            state_and_seen @ (at_start[:, u:] + at_end[:, u:]))
 
 
 @dataclass(frozen=True)
@@ -216,18 +224,22 @@ def _tabulated(structure: Structure, laws: Sequence[CornerLaws], step_s: float) 
     travel = np.linspace(-TRAVEL_M, TRAVEL_M, _POINTS)
     rate = np.linspace(-RATE_MPS, RATE_MPS, _POINTS)
     loads = static_tire_loads_n(structure)
-    tables, pairs, numbers = [], [], []
+    tables, pairs, numbers = np.zeros((4, len(laws), _POINTS)), [], []
     paired = any(one.others for one in laws)
-    for i, one in enumerate(laws):
-        mounted = bool(np.isfinite(one.mount_n_per_m))
-        mount, low, step = _mount(one, rate, step_s) if mounted else (np.zeros(_POINTS), 0.0, 1.0)
-        damper = one.damper(rate) - one.damping_n_s_per_m * rate
-        tables.append([_sum(one.springs, travel), damper, mount, _sum(one.tires, travel)])
+    for i, (one, (springs, damper, mount, tires)) in enumerate(zip(laws, tables.swapaxes(0, 1), strict=True)):
+        mounted, (low, step) = bool(np.isfinite(one.mount_n_per_m)), (0.0, 1.0)
+        if mounted:
+            mount[:], low, step = _mount(one, rate, step_s)
+        if one.springs:
+            springs[:] = _sum(one.springs, travel)
+        if one.tires:
+            tires[:] = _sum(one.tires, travel)
+        damper[:] = one.damper(rate) - one.damping_n_s_per_m * rate
         pairs.append(_pairs(one.others, paired))
         numbers.append([bool(one.springs), bool(damper.any()), mounted, bool(one.tires), bool(one.others),
                         one.mount_n_per_m if mounted else 0.0, low, 1 / step, one.damping_n_s_per_m, structure.tires[i],
                         one.tire_damping_n_s_per_m, np.inf if one.tire_pulls else loads[i]])
-    return np.array(tables).swapaxes(0, 1).copy(), np.array(pairs), np.array(numbers, dtype=float)
+    return tables, np.array(pairs), np.array(numbers, dtype=float)
 
 
 def _mount(laws: CornerLaws, rate: Array, step_s: float) -> tuple[Array, float, float]:
