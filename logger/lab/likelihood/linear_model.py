@@ -108,11 +108,13 @@ class RecordErrorFit:
 
     record           numbers of the record errors (k,) per run
     squares          sum of squares of the whitened residuals and of these numbers
+    gain             by how much these numbers lower it
     before, steps    whitened residuals (kept,) per run before the record errors took these steps (k,)
     """
 
     record: list[Array]
     squares: float
+    gain: float
     before: list[Array]
     steps: list[Array]
     _records: list[_Record]
@@ -240,7 +242,7 @@ class LinearModel:
         """The most likely record errors for residuals (n,) per run of such predictions."""
         from scipy.linalg import cho_solve
 
-        found, squares, whites, steps = [], 0.0, [], []
+        found, squares, gain, whites, steps = [], 0.0, 0.0, [], []
         for residual, whitener, root, precision, one, here in zip(
                 residuals, self.whiteners, self._roots, self._precisions, self._records, record, strict=True):
             white = whitener(residual)
@@ -249,8 +251,9 @@ class LinearModel:
             whites.append(white)
             steps.append(step)
             found.append(here + step)
+            gain += float(owed @ step)
             squares += float(white @ white + here @ precision @ here - owed @ step)
-        return RecordErrorFit(found, squares, whites, steps, self._records)
+        return RecordErrorFit(found, squares, gain, whites, steps, self._records)
 
     def without_record_errors(self, columns: Sequence[Array]) -> list[Array]:
         """Derivatives (m, n) per run less what the record's errors absorb of them, as far as the readings show."""

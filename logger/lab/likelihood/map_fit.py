@@ -186,11 +186,14 @@ def _align_by_lag(posterior: Posterior, state: State, min_share: float) -> Linea
 
 
 def _align_from(start: LinearModel, min_share: float) -> LinearModel:
-    """Gauss-Newton steps of the distance errors, each with their most likely size."""
+    """Gauss-Newton steps of the distance errors, each with their most likely size, as long as they gain or promise
+    enough."""
     best = now = start
     first = least = start.score
     for _ in range(40):
         state, found = now.state, now.fit_record_errors(now.state.predictions)
+        if found.gain < CONVERGED:
+            break
         now = LinearModel(now.posterior, now.posterior.state_at(state.effects, state.logs, found.record, now.size))
         gained = least - now.score
         if gained > 0:
