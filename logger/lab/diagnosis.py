@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from itertools import pairwise
 from types import MappingProxyType
 
@@ -38,14 +39,14 @@ from logger.lab.residuals.breakdown import ModelResiduals
 from logger.lab.residuals.fitted_laws import FittedCar, fitted_car
 from logger.lab.residuals.road_coherence import best_linear_share
 from logger.lab.residuals.unexplained import Removed, Shape, coloured_noise, removed_from, shape_of
-from logger.lab.selection.candidate_fit import CandidateFit, chance_of
+from logger.lab.selection.candidate_fit import CandidateFit
 from logger.lab.selection.detectability import Undetectable, effect_as_moved, undetectable_effects
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION, INDISTINGUISHABLE
 from logger.lab.selection.filter_without_delay import below_filter_without_delay
 from logger.lab.selection.holdout import AS_FILED, REFITTED, ErrorStep, HoldOut, cross_validate
 from logger.lab.selection.screening import Baseline, Screened, misalignment
 from logger.lab.selection.starts import UnknownNumbers, needs_starts
-from logger.lab.selection.stepwise import MeasuredRoad, Search, SearchEffort, Selection, is_outside_data
+from logger.lab.selection.stepwise import F, M, MeasuredRoad, P, Search, SearchEffort, Selection, is_outside_data
 from logger.runs import BY_ROAD, Past, are_on_rig
 from logger.simulation.virtual_drive import steps_hz
 from logger.vehicle import named_parameters
@@ -308,6 +309,8 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
         noise, excess_of = colour, excess_by_signal(fine, state, FALSE_ALARM, colour)
         excess = max(excess_of.values())
     left_open = _left_open(fine, state, errors)
+    candidates, no_better = candidates_of(search, selection, state.effects,
+                                          partial(_best_of_screened, selection.before))
     hidden = undetectable_effects(after, [one for one in tried if one.name not in state.names])
     return LabDiagnosis(
         runs=tuple(run.name for run in fine.runs.runs), catalogue=effects,
@@ -316,7 +319,7 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
         # A colour is known in the bands that are compared: what all of the noise makes is no more than what is left.
         noise_floor_error=floor_error(fine, noise) if colour is None else min(floor_error(fine, noise),
                                                                                fine.error(state)),
-        candidates=(found := _candidates(selection, state, len(tried)))[0], no_better=found[1],
+        candidates=candidates, no_better=no_better,
         obstacles=obstacles_of(posterior, effects, present), verdict=tuple(selection.gains), excess=excess,
         over_noise=over_noise,
         beyond=(beyond := fine.prior.beyond_tolerance(state.logs, errors.covariance)),
@@ -428,38 +431,44 @@ def _steps(selection: Selection, nominal_error: float) -> tuple[ErrorStep, ...]:
     return tuple(steps)
 
 
-def _candidates(selection: Selection, after: State, count: int) -> tuple[tuple[CandidateEffect, ...], tuple[str, ...]]:
+def candidates_of(search: Search[M, P, F], selection: Selection[M, P, F], after: Sequence[Chosen],
+                  best_of: Callable[[P], tuple[Chosen, float, HoldOut]]
+                  ) -> tuple[tuple[CandidateEffect, ...], tuple[str, ...]]:
     """The missing effects, then the others that are better than the refitted model, the least likely by chance first,
-    each with its error on top of that model; and the names of those that are no better."""
-    ends = {one.effect.name: Chosen(one.effect, one.values) for one in after.effects}
-    before, freedom, first = selection.before.hold_out, selection.before.posterior.freedom, selection.first
-    tried = [_of_fit(one, before, count, first.fits) for one in first.fits]
-    tried += [_of_promise(selection.before, one, before, count) for one in first.unfitted]
-    alone, last, found = {one.effect.name: one for one in tried}, selection.now.hold_out, []
+    each with its error on top of that model; and the names of those that are no better.
+
+    after      effects of the model that was found, with their final values
+    best_of    an effect that was screened only at its best strength, its gain by the score test less what its numbers
+               cost, and the refitted model with it on data that no fit saw
+    """
+    base, count, found = selection.before, len(search.effects), []
+    before, last, fits = base.hold_out, selection.now.hold_out, selection.first.fits
+    final = {one.effect.name: Chosen(one.effect, one.values) for one in after}
+
+    def candidate(one: Chosen, gain: float, there: HoldOut, rivals: tuple[str, ...] = (), fitted: bool = True
+                  ) -> CandidateEffect:
+        unseen = before.deviance - there.deviance
+        return CandidateEffect(one, there.error, search.likelihood.chance(one, gain, base, count), gain,
+                               unseen if np.isfinite(unseen) else None, rivals, fitted)
+
+    alone = dict[str, CandidateEffect]()
+    for fit in fits:
+        there = candidate(fit.chosen, fit.gain, fit.hold_out)
+        alone[fit.effect.name] = replace(there, confused_with=tuple(
+            one.effect.name for one in fits if one is not fit and abs(one.gain - fit.gain) < INDISTINGUISHABLE
+            and there.p_value < FALSE_ALARM))
+    alone |= {one.effect.name: candidate(*best_of(one), fitted=False) for one in selection.first.unfitted}
     for name, gain in selection.gains.items():
-        by_chance = chance_of([ends[name]], gain, freedom, count)
-        error, held_out = ((alone[name].error, alone[name].held_out_gain) if name in alone else
-                           (last.error, before.deviance - last.deviance))
-        found.append(CandidateEffect(ends[name], error, by_chance, gain, held_out, selection.rivals.get(name, ())))
-    others = [one for one in tried if one.effect.name not in selection.gains]
-    better = [one for one in others if one.gain > 0 and one.error < before.error]
+        here = candidate(final[name], gain, last, selection.rivals.get(name, ()))
+        by_itself = alone.pop(name, here)
+        found.append(replace(here, error=by_itself.error, held_out_gain=by_itself.held_out_gain))
+    better = [one for one in alone.values() if one.gain > 0 and one.error < before.error]
     return ((*found, *sorted(better, key=lambda one: (one.p_value, -one.gain))),
-            tuple(one.effect.name for one in others if one not in better))
+            tuple(one.effect.name for one in alone.values() if one not in better))
 
 
-def _of_fit(one: CandidateFit, before: HoldOut, count: int, fits: Sequence[CandidateFit]) -> CandidateEffect:
-    """A candidate that was fitted, of so many."""
-    there = one.hold_out
-    p_value = chance_of([one.chosen], one.gain, one.found.posterior.freedom, count)
-    rivals = tuple(other.effect.name for other in fits
-                   if other is not one and abs(other.gain - one.gain) < INDISTINGUISHABLE and p_value < FALSE_ALARM)
-    return CandidateEffect(one.chosen, there.error, p_value, one.gain, before.deviance - there.deviance, rivals)
-
-
-def _of_promise(base: Baseline, one: Screened, before: HoldOut, count: int) -> CandidateEffect:
-    """A candidate that was screened only, at the best strength of its trial."""
+def _best_of_screened(base: Baseline, one: Screened) -> tuple[Chosen, float, HoldOut]:
+    """As ``candidates_of`` asks for it."""
     trial = one.trials[0]
-    there = cross_validate(base.linear, [change[None] for change in trial.change()])
     gain = trial.gain - len(free_parameters_of([trial.one])) * float(np.log(base.posterior.freedom))
-    by_chance = chance_of([trial.one], gain, base.posterior.freedom, count)
-    return CandidateEffect(trial.one, there.error, by_chance, gain, before.deviance - there.deviance, fitted=False)
+    return trial.one, gain, cross_validate(base.linear, [change[None] for change in trial.change()])

@@ -475,7 +475,6 @@ def diagnosis_json(found: LabDiagnosis) -> dict[str, Any]:
         "explained_power": {"refitted": found.explained[0], "final": found.explained[1],
                             "best_linear": found.best_linear},
         "tolerance": found.tolerance, "coloured_noise": found.coloured,
-        "no_better_than_refitted": list(found.no_better),
         "not_tried": found.not_tried,
         "undetectable": {one.effect.name: one.deviations for one in found.undetectable},
         "unexplained_shape": None if found.shape is None else _shape_json(found.shape),
@@ -497,6 +496,7 @@ def _common_json(found: LabDiagnosis | UnknownRoadDiagnosis) -> dict[str, Any]:
             for one in found.candidates],
         "verdict": list(found.verdict), "unexplained": found.unexplained, "residual_over_noise": 1 + found.excess,
         "steps": [{"step": step.words, "error": step.error} for step in found.steps],
+        "no_better_than_refitted": list(found.no_better),
         **lab_words.errors_json(found.steps, found.noise_floor_error),
     }
 
@@ -527,8 +527,7 @@ def diagnosis_blocks(found: LabDiagnosis, most: int | None) -> Iterator[Block]:
         Bars("NRMSE with each effect", "NRMSE", tuple(
             (one.effect.name, one.error) for one in found.candidates[:_MOST_BARS]),
             (found.baseline_error, "file unchanged")),
-        _table(found, most),
-        *([f"No better than the refit alone: {', '.join(found.no_better)}."] if found.no_better else [])])
+        *_table(found, most)])
     yield Section("What these runs cannot tell", [Bullets(untested(found))])
     yield Detail("Sources", [Bullets([f"{one.effect.name}: {one.effect.source}" for one in found.missing])])
 
@@ -538,8 +537,10 @@ _LEAST_SHARE, _MOST_BARS = 0.01, 12
 _MOTION_UNITS = {RATE: "m/s", TRAVEL: "m"}
 
 
-def _table(found: LabDiagnosis | UnknownRoadDiagnosis, most: int | None) -> Table:
-    return Table(("Effect", "NRMSE", "p-value", "Parameters"), list(table(found)), (0, 3), most, " (--json lists all)")
+def _table(found: LabDiagnosis | UnknownRoadDiagnosis, most: int | None) -> Iterator[Block]:
+    yield Table(("Effect", "NRMSE", "p-value", "Parameters"), list(table(found)), (0, 3), most, " (--json lists all)")
+    if found.no_better:
+        yield f"No better than the refit alone: {', '.join(found.no_better)}."
 
 
 def _steps(found: LabDiagnosis | UnknownRoadDiagnosis) -> Detail:
@@ -653,7 +654,7 @@ def same_road_blocks(found: UnknownRoadDiagnosis, runs: Sequence[str], most: int
     """What a person reads; at a terminal ``most`` so many candidates, None: all."""
     yield from same_road_summary(found)
     yield _steps(found)
-    yield Section(_ONE_BY_ONE, [_table(found, most)])
+    yield Section(_ONE_BY_ONE, list(_table(found, most)))
     yield Table(("Run", "NRMSE before", "after"), [
         (name, f"{before:.3f}", f"{after:.3f}") for name, (before, after) in zip(runs, found.by_run, strict=True)])
     yield Section("What these drives cannot tell", [Bullets(cannot_tell(found))])

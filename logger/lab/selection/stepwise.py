@@ -105,6 +105,9 @@ class Fitted(Protocol):
     def chosen(self) -> Chosen: ...
 
     @property
+    def hold_out(self) -> HoldOut: ...
+
+    @property
     def gain(self) -> float: ...
 
 

@@ -11,21 +11,21 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
 from logger.fitting.information_matrix import integrated_out, inverse
 from logger.identification.identifiability import NOT_ONE_ROAD, Finding, structural
-from logger.lab.diagnosis import CandidateEffect
+from logger.lab.diagnosis import CandidateEffect, candidates_of
 from logger.lab.likelihood.noise_floor import NoiseLevel
 from logger.lab.likelihood.standard_errors import with_standard_errors
 from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
-from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE, probability_by_chance
+from logger.lab.selection.evidence import FALSE_ALARM, probability_by_chance
 from logger.lab.selection.holdout import AS_FILED, REFITTED, ErrorStep, HoldOut
 from logger.lab.selection.screening import shared_parameters
-from logger.lab.selection.stepwise import Likelihood, Search, SearchEffort, Selection, names_of
+from logger.lab.selection.stepwise import Likelihood, Search, SearchEffort, names_of
 from logger.lab.unknown_road.same_road import (
     NotOneRoad,
     RoadFitState,
@@ -66,6 +66,7 @@ class UnknownRoadDiagnosis:
     undecided     effects that explain more than chance would, but so little of what no road explains that they may only
                   imitate what is missing
     exact_places  whether the distances of the drives are a recorder's, not a receiver's
+    no_better     names of the other effects that were tried
     """
 
     candidates: tuple[CandidateEffect, ...]
@@ -80,8 +81,9 @@ class UnknownRoadDiagnosis:
     noise_mps2: float
     excess: float
     doubtful: tuple[tuple[str, str], ...] = ()
-    undecided: tuple[CandidateEffect, ...] = ()
+    undecided: tuple[Chosen, ...] = ()
     exact_places: bool = True
+    no_better: tuple[str, ...] = ()
 
     @property
     def baseline_error(self) -> float:
@@ -173,6 +175,11 @@ class RoadCandidate:
     def effect(self) -> Effect:
         """The effect."""
         return self.chosen.effect
+
+    @property
+    def hold_out(self) -> HoldOut:
+        """Each drive as predicted by the others."""
+        return self.model.hold_out
 
 
 @dataclass(frozen=True)
@@ -293,49 +300,26 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
     way = [ErrorStep(AS_FILED, as_filed), ErrorStep(REFITTED, base.hold_out.error),
            *(ErrorStep(f"with {name}", steps.get(name, now.hold_out).error) for name in names)]
     way[-1] = replace(way[-1], error=now.hold_out.error)
-    undecided = [one for one in selection.last.fits if search.may_imitate(now, one)]
+    undecided = tuple(one.chosen for one in selection.last.fits if search.may_imitate(now, one))
+    candidates, no_better = candidates_of(search, selection, now.effects, partial(_best_of_screened, base))
     return UnknownRoadDiagnosis(
-        _candidates(selection, len(tried)), tuple(by_name[name] for name in names), tuple(way),
+        tuple(replace(one, stands_in=not now.problem.is_linear([one.one], now.state.logs)) for one in candidates),
+        tuple(by_name[name] for name in names), tuple(way),
         tuple(zip(before.problem.errors(before.state), now.problem.errors(now.state), strict=True)),
         now.noise.deviation_mps2 / now.problem.size_mps2, untried, road,
         {name: one.deviations for name, one in usual.items() if one.deviations < DETECTABLE_SIGMA and name not in road},
         _confounded_numbers(now.fit), now.state.noise_mps2, _excess(now),
         tuple((problem.runs[one].name, problem.runs[other].name) for one, other in possible_two_roads(agreements)),
-        tuple(_candidate(one, len(tried)) for one in undecided), problem.exact_places,
+        undecided, problem.exact_places, no_better,
     )
 
 
-def _candidates(selection: Selection[RoadModel, RoadTrial, RoadCandidate], count: int
-                ) -> tuple[CandidateEffect, ...]:
-    """Effects that were found, then the others of the first round, best first."""
-    now, hold_outs = selection.now, dict(selection.steps)
-    found = []
-    for name, gain in selection.gains.items():
-        one = next(one for one in now.effects if one.effect.name == name)
-        error = hold_outs.get(name, now.hold_out).error
-        found.append(CandidateEffect(one, error, probability_by_chance(gain, count), gain,
-                                     confused_with=selection.rivals.get(name, ()),
-                                     stands_in=not now.problem.is_linear([one], now.state.logs)))
-    fits = selection.first.fits
-    others = [replace(_candidate(one, count), confused_with=tuple(
-        other.effect.name for other in fits if other is not one and abs(other.gain - one.gain) < INDISTINGUISHABLE
-        and probability_by_chance(one.gain, count) < FALSE_ALARM)) for one in fits]
-    before = selection.before
-    for trial in selection.first.unfitted:
-        best = trial.starts[0].best
-        there = UnmeasuredRoad(lambda words: None)._state(before, (*before.effects, best))
-        gain = trial.gain - len(free_parameters_of([best])) * float(np.log(before.problem.samples))
-        others.append(CandidateEffect(best, before.problem.error(there), probability_by_chance(gain, count), gain,
-                                      fitted=False, stands_in=not before.problem.is_linear([best], there.logs)))
-    others.sort(key=lambda one: (not one.fitted, -one.gain))
-    return (*found, *(one for one in others if one.effect.name not in selection.gains))
-
-
-def _candidate(one: RoadCandidate, count: int) -> CandidateEffect:
-    """A fitted effect as one of so many candidates."""
-    model = one.model
-    return CandidateEffect(one.chosen, model.hold_out.error, probability_by_chance(one.gain, count), one.gain,
-                           stands_in=not model.problem.is_linear([one.chosen], model.state.logs))
+def _best_of_screened(base: RoadModel, one: RoadTrial) -> tuple[Chosen, float, HoldOut]:
+    """As ``candidates_of`` asks for it."""
+    best, problem = one.starts[0].best, base.problem
+    gain = one.gain - len(free_parameters_of([best])) * float(np.log(problem.samples))
+    return best, gain, HoldOut(problem.error(replace(base.state, effects=(*base.effects, best), gains=problem.response(
+        (*base.effects, best), base.state.logs))), float("nan"))
 
 
 def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequence[Chosen]

@@ -146,7 +146,7 @@ def test_friction_is_not_taken_for_another_damping() -> None:
 
 def test_what_may_only_imitate_is_not_named() -> None:
     one = CandidateEffect(named("tire_damping", tire_damping_n_s_per_m=300.0), 0.28, 1e-12, 60.0)
-    found = UnknownRoadDiagnosis((one,), (), STEPS, (), 0.1, {}, {}, {}, (), 0.1, 0.5, undecided=(one,))
+    found = UnknownRoadDiagnosis((one,), (), STEPS, (), 0.1, {}, {}, {}, (), 0.1, 0.5, undecided=(one.one,))
     reported = same_road_json(found)
     assert reported["verdict"] == [] and reported["undecided"] == ["tire_damping"]
     assert any(words.startswith("Undecided: tire_damping. It explains more than") for words in reported["sentences"])
