@@ -50,7 +50,6 @@ _CLOSE, _CLOSE_SIMULATED, _CLOSE_NOISE = 1e-5, 1e-2, 1e-4
 _MOST_STEPS, _MOST_NOISE_ROUNDS = 100, 20  # of one descent; of noise model and numbers in turn
 _AT_BOUND = 1e-6
 _FAR = 3.0
-_ROOT_STEPS = 60
 
 
 class Predictor(Protocol):
@@ -176,9 +175,7 @@ def spread_starts(free: Sequence[Free], count: int) -> list[dict[str, float]]:
 
     Additive recurrence with powers of the root of x^(p+1) = x + 1, which leaves no corner empty (M. Roberts 2018).
     """
-    ratio = 1.0
-    for _ in range(_ROOT_STEPS):
-        ratio = (1 + ratio) ** (1 / (len(free) + 1))
+    ratio = max(np.roots([1.0, *[0.0] * (len(free) - 1), -1.0, -1.0]).real)
     starts = []
     for number in range(1, count + 1):
         start = {}

@@ -30,8 +30,8 @@ from logger.estimation.batch import estimated, exact_iri
 from logger.estimation.rms_calibration import rms_relation
 from logger.estimation.sensor_noise import Sensor
 from logger.identification.drive_model import DriveModel
-from logger.identification.noise_models import Autoregressive, NoiseModel, RoadNoise, White
-from logger.identification.prediction_error_fit import Fit, FitOptions, fit
+from logger.identification.prediction_error_fit import Fit, fit
+from logger.identification.session import fit_options
 from logger.identification.unknown_inputs import SPEED_SCALE, Bump, RoadInput, free_input, is_input
 from logger.profiles.track import Track
 from logger.roads.elevation_spectrum import iri_per_root_gd
@@ -249,10 +249,7 @@ def fitted(record: Run, start: Mapping[str, float], ours: bool, road: RoadInput 
     numbers = [free_input(road, name, value) if is_input(name) else free(car, name, value)
                for name, value in start.items()]
     model = DriveModel(car, numbers, [record], road)
-    noise: list[NoiseModel] = [White()]
-    if ours:
-        noise += [Autoregressive(), RoadNoise(model.road_spectra)]
-    return fit(model, model.measured, FitOptions(rate_hz=RATE_HZ, noise=noise, low_pass_hz=low_pass_hz))
+    return fit(model, model.measured, fit_options(model, "auto" if ours else "white", low_pass_hz, 0))
 
 
 def mass_and_bump(record: Run, taken: Bump, low_pass_hz: float | None = None) -> Fit:

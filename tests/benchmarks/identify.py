@@ -19,6 +19,7 @@ from logger.identification.drive_model import DriveModel
 from logger.identification.identifiability import NotIdentifiable
 from logger.identification.noise_models import Autoregressive, NoiseModel, RoadNoise, White
 from logger.identification.prediction_error_fit import Fit, FitOptions, fit
+from logger.identification.session import fit_options
 from logger.identification.shared_road_covariance import with_common_roughness
 from logger.identification.unknown_inputs import Bump, RoadInput, expanded, free_input, is_input
 from logger.identification.unknown_road.road_fit import fit_roads
@@ -73,8 +74,7 @@ def main() -> int:
 
 def fitted(record: Run, start: dict[str, float], noise: str = "auto") -> Fit:
     model = DriveModel(CAR, [free(CAR, name, value) for name, value in start.items()], [record])
-    kinds: dict[str, NoiseModel] = {"white": White(), "ar": Autoregressive(), "road": RoadNoise(model.road_spectra)}
-    return fit(model, model.measured, FitOptions(noise=list(kinds.values()) if noise == "auto" else [kinds[noise]]))
+    return fit(model, model.measured, fit_options(model, noise, None, 0))
 
 
 def rough(seed: int) -> Run:

@@ -9,7 +9,7 @@ import numpy as np
 
 from logger.api.lab.compare import addition_json, bias, errors, judgement, moved_blocks
 from logger.lab.residuals.unexplained import OFFSET, Drift, Removed
-from logger.lab.selection.add_effect import AddedEffects, Number
+from logger.lab.selection.add_effect import AddedEffects, ShiftedNumber
 from logger.report.blocks import Table
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
@@ -19,12 +19,12 @@ from ..support.lab.runs_with_residual import CAR
 
 EFFECTS = shipped_effects()
 AS_USUAL = Removed((), 0.0, 0.0, 0.0, 0.0, 0.153)
-MASS = Number("sprung_mass_kg", nominal=875.0, without=846.0, without_standard_error=9.8, found=876.0,
-              standard_error=7.5)
-TIRE = Number("rear.tire_stiffness_n_per_m", nominal=238180.0, without=300000.0, without_standard_error=3000.0,
-              found=240000.0, standard_error=3000.0)
-STILL = Number("contact_patch_m", nominal=0.25, without=0.2501, without_standard_error=0.003, found=0.25,
-               standard_error=0.003)
+MASS = ShiftedNumber("sprung_mass_kg", nominal=875.0, without=846.0, without_standard_error=9.8, found=876.0,
+                     standard_error=7.5)
+TIRE = ShiftedNumber("rear.tire_stiffness_n_per_m", nominal=238180.0, without=300000.0, without_standard_error=3000.0,
+                     found=240000.0, standard_error=3000.0)
+STILL = ShiftedNumber("contact_patch_m", nominal=0.25, without=0.2501, without_standard_error=0.003, found=0.25,
+                      standard_error=0.003)
 FOUND = AddedEffects(
     CAR, (chosen(EFFECTS["sensor_gain"], {"gain": 1.02}, standard_errors={"gain": 0.01}),
           chosen(EFFECTS["dry_friction"], EFFECTS["dry_friction"].usual | {"friction_force_n": 84.7}, standard_errors={

@@ -6,7 +6,7 @@ whether to believe it; as pictures its residuals, and which numbers can be estim
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from pathlib import Path
@@ -237,17 +237,25 @@ def _on_measured_roads(given: Model, records: list[Record], question: IdentifyQu
     model, checks = found.model, tests(found.model, found.fit)
     fit = (common := with_common_roughness(model, found.fit)).fit
     low = "" if fit.low_pass.cutoff_hz is None else f", below {fit.low_pass.cutoff_hz:g} Hz"
+    first = _first_lines(fit, _head(given, len(fit.free), records, low), "rms(measured - model) / rms(measured)")
     lines = [_in_words_of(records, one) for one in measured_lines(fit, *checks)]
-    content = Blocks([Lines([*_first_lines(fit, _head(given, len(fit.free), records, low),
-                                 "rms(measured - model) / rms(measured)")]),
-            _table(fit, fit.free), Lines([*lines, *common_words(model, common), *record_words(found)]),
-            _left_out_lines(records)])
+    return _identification(
+        records, fit, fit.free, first, [*lines, *common_words(model, common), *record_words(found)],
+        measured_json(fit, *checks) | {"common_roughness": common.share, "rounding_by_bounds": found.rounded,
+                                       "moved_m": found.moved_m},
+        _fitted(given, model, fit), [_in_words_of(records, one) for one in doubts(fit, *checks)])
+
+
+def _identification(records: Sequence[Record], fit: Fit | RoadFit, free: Sequence[Free], first: Iterable[str],
+                    lines: Iterable[str], summary: Mapping[str, Any], model: vehicle_file.CarModel,
+                    cannot_tell: Sequence[str]) -> Identification:
+    """A fit as it is shown: its first lines, a table of its numbers, and more lines."""
+    # The first line says that the beginnings are left out.
+    left_out = left_out_lines(runs_left_out([replace(one, skip_s=0.0) for one in records]))
     return Identification(
-        content, measured_json(fit, *checks) | {
-            "common_roughness": common.share, "rounding_by_bounds": found.rounded, "moved_m": found.moved_m,
-            "runs": [record.name for record in records], **left_out_json(runs_left_out(records))},
-        fit, model_of(_fitted(given, model, fit)),
-        tuple(_in_words_of(records, one) for one in doubts(fit, *checks)))
+        Blocks([Lines([*first]), _table(fit, free), Lines([*lines]), Lines(left_out)]),
+        {**summary, "runs": [record.name for record in records], **left_out_json(runs_left_out(records))},
+        fit, model_of(model), tuple(cannot_tell))
 
 
 def _with_unknown_numbers(given: vehicle_file.CarModel, word: str, question: IdentifyQuestion) -> IdentifyQuestion:
@@ -281,11 +289,6 @@ def _ranges(given: vehicle_file.CarModel, records: Sequence[Record]) -> dict[str
 def _in_words_of(records: Sequence[Record], line: str) -> str:
     """A line for a person, with the unit that was measured."""
     return line.replace("m/s2", records[0].facts.main.unit)
-
-
-def _left_out_lines(records: Sequence[Record]) -> Lines:
-    """What is left out, but the beginnings, which the first line says."""
-    return Lines(left_out_lines(runs_left_out([replace(one, skip_s=0.0) for one in records])))
 
 
 def _check_effects(given: vehicle_file.CarModel, word: str, records: Sequence[Record],
@@ -435,16 +438,13 @@ def _on_unmeasured_roads(given: Model, records: list[Record], question: Identify
     fitted = car.vehicle_with(np.array(list(fit.parameters.values())))
     model = vehicle_file.CarModel(fitted, errors=_errors(list(fit.parameters), fit.covariance),
                                   given=given.given or given.vehicle, known=given.known)
-    content = Blocks([Lines([*_first_lines(fit, _head(given, len(parameters), records, f"; over {where}", ","),
-                                 "rms(residual) / rms(measured) over the most probable road")]),
-            _table(fit, parameters), Lines([*unmeasured_lines(fit, parameters)]),
-            _left_out_lines(records)])
+    first = _first_lines(fit, _head(given, len(parameters), records, f"; over {where}", ","),
+                         "rms(residual) / rms(measured) over the most probable road")
     cannot_tell = [finding.words for finding in fit.verdict]
-    return Identification(
-        content, _fit_json(fit, parameters) | {
-            "road": fit.roads, "road_standard_errors": fit.road_errors, "cannot_tell": cannot_tell,
-            "runs": [record.name for record in records], **left_out_json(runs_left_out(records))},
-        fit, model_of(model), tuple(cannot_tell))
+    return _identification(
+        records, fit, parameters, first, unmeasured_lines(fit, parameters),
+        _fit_json(fit, parameters) | {"road": fit.roads, "road_standard_errors": fit.road_errors,
+                                      "cannot_tell": cannot_tell}, model, cannot_tell)
 
 
 def _road_options(question: IdentifyQuestion) -> tuple[RoadOptions, IdentifyQuestion]:

@@ -26,8 +26,7 @@ from logger.lab.compare import LabComparison, Standing
 from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.residuals.breakdown import ModelResiduals, Part, frequencies, segments
 from logger.lab.residuals.force_state_map import Curve, ForceMap
-from logger.lab.selection.add_effect import BIAS_SIGMA, AddedEffects, Number
-from logger.lab.selection.add_effect import Number as ShiftedNumber
+from logger.lab.selection.add_effect import BIAS_SIGMA, AddedEffects, ShiftedNumber
 from logger.lab.selection.holdout import JUDGED_ON, fit_percent
 from logger.left_out import left_out_json, left_out_lines
 from logger.printable import counted
@@ -566,7 +565,7 @@ def judgement(found: AddedEffects) -> list[str]:
     return lines
 
 
-def bias(names: Sequence[str], moved: Sequence[Number]) -> str:
+def bias(names: Sequence[str], moved: Sequence[ShiftedNumber]) -> str:
     """What the car's numbers, most moved first, had been taken for without the effects."""
     together = " and ".join(names)
     biased = [one for one in moved if one.biased]
@@ -588,7 +587,7 @@ def _change(name: str, before: float, after: float) -> str:
     return f"{after - before:+.4g} {unit_of(name)}"
 
 
-def moved_blocks(moved: Sequence[Number]) -> list[Block]:
+def moved_blocks(moved: Sequence[ShiftedNumber]) -> list[Block]:
     """A table of the car's numbers, and what its columns are; nothing where none moved."""
     rows = []
     for one in moved:

@@ -28,7 +28,7 @@ from logger.files import make_folder, write_text
 from logger.lab import compare, diagnosis
 from logger.lab.likelihood.posterior import State
 from logger.lab.residuals.breakdown import ModelResiduals, frequencies
-from logger.lab.selection.add_effect import AddedEffects, Number, moved_between
+from logger.lab.selection.add_effect import AddedEffects, ShiftedNumber, moved_between
 from logger.lab.selection.holdout import JUDGED_ON
 from logger.question import Notify, function
 from logger.report import document as doc
@@ -102,7 +102,7 @@ class Story:
         return (self.rounds[-1].addition if self.rounds else self.diagnoses[-1]).noise_floor_error
 
     @property
-    def moved(self) -> list[Number]:
+    def moved(self) -> list[ShiftedNumber]:
         """The car's numbers without and with the effects; none where nothing was added."""
         return moved_between(self.rounds[0].addition, self.rounds[-1].addition) if self.rounds else []
 

@@ -44,7 +44,7 @@ BIAS_SIGMA = 2.0
 
 
 @dataclass(frozen=True)
-class Number:
+class ShiftedNumber:
     """A parameter of the car: nominal, refitted without the added effects, and with them; with standard errors, which
     include the prior."""
 
@@ -92,7 +92,7 @@ class AddedEffects:
     vehicle: Vehicle
     effects: tuple[Chosen, ...]
     names: tuple[str, ...]
-    numbers: tuple[Number, ...]
+    numbers: tuple[ShiftedNumber, ...]
     error_before: float
     error_refitted: float
     error_after: float
@@ -136,15 +136,15 @@ class AddedEffects:
         return tuple(one for one in self.effects if one.effect.name in self.names)
 
     @property
-    def moved(self) -> list[Number]:
+    def moved(self) -> list[ShiftedNumber]:
         """The car's numbers, those that the effects moved most first."""
         return moved_between(self, self)
 
 
-def moved_between(first: AddedEffects, last: AddedEffects) -> list[Number]:
+def moved_between(first: AddedEffects, last: AddedEffects) -> list[ShiftedNumber]:
     """The car's numbers without the effects that ``first`` added, and with all that ``last`` has; those that moved most
     first."""
-    found = [Number(one.name, one.nominal, one.without, one.without_standard_error, now.found, now.standard_error)
+    found = [replace(one, found=now.found, standard_error=now.standard_error)
              for one, now in zip(first.numbers, last.numbers, strict=True)]
     return sorted(found, key=lambda one: -abs(one.shift))
 
@@ -167,8 +167,8 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
                         candidates)
     without, found = (prior.vehicle(nominal, one.state.logs) for one in (before, after))
     numbers = tuple(
-        Number(name, read(nominal, name), read(without, name), read(without, name) * float(was), read(found, name),
-               read(found, name) * float(now))
+        ShiftedNumber(name, read(nominal, name), read(without, name), read(without, name) * float(was),
+                      read(found, name), read(found, name) * float(now))
         for name, was, now in zip(prior.names, standard_errors(before).logs, errors.logs, strict=True)
     )
     start, state = posterior.start(present), after.state
