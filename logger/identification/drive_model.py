@@ -96,7 +96,7 @@ class DriveModel:
         """As ``Predictor``: differences, to both sides of a number unless it is at a bound."""
         columns = []
         for index, one in enumerate(self.parameters):
-            step = self._step(one, float(values[index]))
+            step = self._step(index, values)
             ends = np.clip(values[index] + step * np.array([-1.0, 1.0]), one.low, one.high)
             low, high = (self.predict(np.where(np.arange(len(values)) == index, end, values)) for end in ends)
             columns.append([(there - here) / (ends[1] - ends[0]) for here, there in zip(low, high, strict=True)])
@@ -169,15 +169,14 @@ class DriveModel:
         return [record.distance_m * (1 / road.speed_scale - 1) for record, road in zip(
             self.records, roads, strict=True)], [self._track(run, road) for run, road in enumerate(roads)]
 
-    def _step(self, one: Free, value: float) -> float:
+    def _step(self, index: int, values: Array) -> float:
         """Of a number where it is."""
+        one, value = self.parameters[index], float(values[index])
         share = _SMOOTH_STEP if self.exact else _STEP
         if (free := self._free_parameters.get(one.name)) is not None:
-            chosen = self.effects[free.effect]
-            parameter = chosen.effect.parameters[free.parameter]
-            here = Chosen(chosen.effect, {**chosen.values, parameter.name: value})
-            step = float(steps_of([*self.effects[: free.effect], here], [free], _STEP, _SHARE_STEP)[0])
-            return step / slope_of(parameter, value)
+            effects = self.effects_with(values)
+            step = float(steps_of(effects, [free], _STEP, _SHARE_STEP)[0])
+            return step / slope_of(effects[free.effect].effect.parameters[free.parameter], value)
         if one.by_factors:
             return value * (_SPEED_STEP if one.name.endswith(SPEED_SCALE) else share)
         return share * (one.usual or 1.0)

@@ -32,6 +32,7 @@ def test_a_missing_effect_is_found(tmp_path: Path) -> None:
     reported = reported_of(1, "sensor_mount_resonance", tmp_path)
     first = next(one for one in reported["candidates"] if one["effect"] == reported["verdict"][0])
     assert "sensor_mount_resonance" in [first["effect"], *first["confused_with"]]
+    assert {"effect", "parameters", "error", "p_value", "confused_with"} <= first.keys()
     assert reported["steps"][-1]["error"] < reported["steps"][1]["error"] < reported["baseline_error"]
     assert {"sensor_gain", "tire_enveloping"} <= reported["taken_by_road"].keys()
     assert {"damper_asymmetry", "speed_scale", "roll"} <= reported["not_tried"].keys()
@@ -42,7 +43,8 @@ def test_a_missing_effect_is_found(tmp_path: Path) -> None:
 def test_nothing_missing(tmp_path: Path) -> None:
     reported = reported_of(2, None, tmp_path)
     assert reported["verdict"] == []
-    assert {"effect", "parameters", "error", "p_value", "confused_with"} <= reported["candidates"][0].keys()
+    better = {one["effect"] for one in reported["candidates"]}
+    assert {*better, *reported["no_better_than_refitted"]} == {*FEW} - reported["not_tried"].keys()
 
 
 def test_one_drive_is_refused(tmp_path: Path) -> None:
