@@ -177,9 +177,10 @@ class Posterior:
                  for index, one in enumerate(tracks)]  # repeats have noise of their own
         if all(one is other for one, other in zip(noisy, tracks, strict=True)):
             return [np.zeros_like(one) for one in state.predictions]
-        car, error_m = self.car(state.effects, state.logs), self.distance_error_m(state.record)
-        return [one - other for one, other in zip(self.runs.predict(car, error_m, tracks=noisy),
-                                                  self.runs.predict(car, error_m), strict=True)]
+        there = self.runs.predict(self.car(state.effects, state.logs), self.distance_error_m(state.record),
+                                  tracks=noisy)
+        return [error.with_recorder_error(one, k) - here for error, one, k, here in zip(
+            self.record_errors, there, state.record, state.predictions, strict=True)]
 
     def deviance(self, state: State) -> float:
         """Minus twice the log-likelihood, with the most likely noise levels."""
