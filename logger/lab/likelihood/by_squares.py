@@ -16,7 +16,7 @@ import numpy as np
 from logger.arrays import Array
 from logger.lab.likelihood.distance_error import ErrorSize
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import CONVERGED, optimise_numbers
+from logger.lab.likelihood.map_fit import CONVERGED, optimise_numbers, record_by_lag
 from logger.lab.likelihood.posterior import NotSimulated, Posterior, State
 from logger.lab.likelihood.repeats import repeat_each_other
 from logger.lab.likelihood.signals import JointWhitener
@@ -65,7 +65,8 @@ class BySquares:
 
     def at(self, effects: Sequence[Chosen], logs: Array, near: State) -> tuple[float, State] | None:
         """The state with these numbers and the records' errors of another state, of these runs or of all, and its
-        deviance; None where it cannot be."""
+        deviance; None where it cannot be. Another car took a wave sooner or later, and its distance errors make up for
+        that: those that the lags behind this one amount to are taken where they are likelier."""
         return self._at(effects, logs, self._kept_of(near.record), near.size)
 
     def rank(self, effects: Sequence[Chosen], logs: Array, near: State) -> float:
@@ -80,14 +81,19 @@ class BySquares:
 
     def _at(self, effects: Sequence[Chosen], logs: Array, record: list[Array], size: ErrorSize, rough: bool = False
             ) -> tuple[float, State] | None:
+        def there(record: list[Array]) -> tuple[float, State]:
+            predictions = self.posterior.predict(effects, logs, record, rough, () if rough else None)
+            state = State(tuple(effects), logs, record, size, predictions)
+            return self.deviance(state), state
+
         try:
             with np.errstate(all="ignore"):
-                predictions = self.posterior.predict(effects, logs, record, rough, () if rough else None)
-                state = State(tuple(effects), logs, record, size, predictions)
-                deviance = self.deviance(state)
+                found = there(record)
+                if (aligned := record_by_lag(self.posterior, found[1])) is not None:
+                    found = min(found, there(aligned), key=lambda one: one[0])
         except NotSimulated:
             return None
-        return (deviance, state) if np.isfinite(deviance) else None
+        return found if np.isfinite(found[0]) else None
 
     @cached_property
     def _loudest(self) -> BySquares:

@@ -70,8 +70,8 @@ def lags(runs: Sequence[Run], predictions: Sequence[Array]) -> Lags:
 def offset_by_lag_m(run: Run, prediction: Array) -> Array:
     """Distance error (n,) [m] that the lags behind a prediction (n,) amount to, linear between windows; 0 without
     windows, and on a rig."""
-    windows = lags([run], [prediction])
-    if run.timed or not len(windows.run):
+    windows = None if run.timed else lags([run], [prediction])
+    if windows is None or not len(windows.run):
         return np.zeros(run.count)
     places_m = np.maximum.accumulate(windows.along_m)
     return np.asarray(np.interp(run.distance_m - run.distance_m[0], places_m, -windows.lag_m))

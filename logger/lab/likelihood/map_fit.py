@@ -174,15 +174,22 @@ def _align_by_correlation(posterior: Posterior, state: State, min_share: float) 
 
 
 def _align_by_lag(posterior: Posterior, state: State, min_share: float) -> LinearModel | None:
-    """Alignment from the distance errors that the lags amount to; None where these are small enough to be found from
-    the state itself."""
+    """Alignment from ``record_by_lag``; None where that is."""
+    record = record_by_lag(posterior, state)
+    if record is None:
+        return None
+    followed = posterior.state_at(state.effects, state.logs, record, state.size)
+    return _align_from(LinearModel(posterior, followed), min_share)
+
+
+def record_by_lag(posterior: Posterior, state: State) -> list[Array] | None:
+    """Record errors with the distance errors that a state's lags amount to; None where these are small enough to be
+    found from the state itself."""
     farther_m = [offset_by_lag_m(run, one) for run, one in zip(posterior.runs.runs, state.predictions, strict=True)]
     if max(float(np.abs(one).max()) for one in farther_m) < _NEAR_M:
         return None
-    record = [error.coefficients_of(error.distance_error_m(k) + more) for error, k, more in zip(
+    return [error.coefficients_of(error.distance_error_m(k) + more) for error, k, more in zip(
         posterior.record_errors, state.record, farther_m, strict=True)]
-    followed = posterior.state_at(state.effects, state.logs, record, state.size)
-    return _align_from(LinearModel(posterior, followed), min_share)
 
 
 def _align_from(start: LinearModel, min_share: float) -> LinearModel:

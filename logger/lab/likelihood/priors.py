@@ -172,6 +172,10 @@ class VehiclePrior:
         return {self.names[index]: (float(np.expm1(logs[index])), float(np.exp(logs[index]) * errors[index]))
                 for index in np.argsort(-np.abs(logs / self.deviations)) if abs(logs[index]) > least[index]}
 
+    def is_contradicted_by(self, logs: Array) -> bool:
+        """Whether logarithms (p,) are in conflict with it, whatever their errors are."""
+        return self.is_in_conflict(logs, np.zeros_like(logs))
+
     def is_in_conflict(self, logs: Array, errors: Array) -> bool:
         """Whether the runs move a number beyond its tolerance, and farther than numbers are off by chance.
 

@@ -93,7 +93,8 @@ class UnknownNumbers(MeasuredRoad):
         others are tried with these."""
         local = super().screened(base, effects, seen, near, pool, progress)
         # Were numbers far off, the car's resonances would be, and leave more than so little of what was measured.
-        if base.explanation == 0 or base.hold_out.error < UNEXPLAINED:
+        if ((base.explanation == 0 or base.hold_out.error < UNEXPLAINED)
+                and not base.posterior.prior.is_contradicted_by(base.state.logs)):
             return local
         by_squares = self._by_squares(base.posterior)
         anchor = self._anchor(by_squares, base.state, 1)
@@ -116,8 +117,11 @@ class UnknownNumbers(MeasuredRoad):
     @staticmethod
     def _shows_the_car(by_squares: BySquares, without: State, there: State) -> bool:
         """Whether a model leaves so little above the noise of what was measured that the numbers of its car are not far
-        off, and so little of what the one without its last effect leaves that others can only imitate it."""
+        off, nor contradict what is known, and so little of what the one without its last effect leaves that others can
+        only imitate it."""
         posterior = by_squares.posterior
+        if posterior.prior.is_contradicted_by(there.logs):
+            return False
         noise = floor_error(posterior, sensor_noise_of(posterior, there))**2
         left, before = (posterior.error(one)**2 - noise for one in (there, without))
         return left < min(UNEXPLAINED**2, IMITATION * before)
@@ -218,6 +222,7 @@ class UnknownNumbers(MeasuredRoad):
         before they are improved. What was let go rings at a mode, which may be too sharp to be drawn by chance: half of
         them have one there."""
         prior, ringing_hz = posterior.prior, _ringing_hz(posterior.runs.runs)
+        spread = np.minimum(prior.deviations, WEAKEST * prior.steps / prior.steps.max())  # of lengths, which waves show
         rng = np.random.default_rng(crc32((effect.name if effect else "").encode()))
         trials = [chosen(effect, values) for values in effect.trials()] if effect else []
         forms = [some for plain in (True, False) if (some := [one for one in trials if one.is_plain is plain])]
@@ -225,7 +230,7 @@ class UnknownNumbers(MeasuredRoad):
         for number in range(self.draws):
             logs = near.logs * (number % 2)
             if number > 1:
-                logs = logs + np.minimum(prior.deviations, WEAKEST) * rng.standard_normal(len(logs))
+                logs = logs + spread * rng.standard_normal(len(logs))
                 if ringing_hz and number // 2 % 2:
                     logs = _tuned(posterior, logs, ringing_hz[number // 4 % len(ringing_hz)])
             effects = [_resized(one, rng, WEAKEST) for one in near.effects]

@@ -62,6 +62,18 @@ def test_a_start_ends_early_where_it_cannot_reach_another_at_its_pace() -> None:
     assert by_squares.improved(start, 12, once - 20 * (begun - once))[0] == once
 
 
+def test_on_a_road_a_car_is_compared_where_it_was_not_where_another_would_have_been() -> None:
+    posterior = posterior_of(secret_runs(lasts_s=8.0))
+    by_squares, exact = BySquares.of(posterior), posterior.start()
+    record = [one.coefficients_of(np.full(one.run.count, 0.09)) for one in posterior.record_errors]
+    off = posterior.state_at((), exact.logs, record)
+    found = by_squares.at((), exact.logs, off)
+    assert found is not None
+    assert by_squares.deviance(off) > by_squares.deviance(exact) + 1000
+    assert found[0] < by_squares.deviance(exact) + 50
+    assert by_squares.rank((), exact.logs, off) < by_squares.rank((), exact.logs, exact) + 50
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("noise_mps2", [0.02, 0.5])
 def test_where_an_effect_leaves_next_to_nothing_but_noise_others_are_tried_in_its_car(
