@@ -103,6 +103,11 @@ class LikeliestRig:
         return np.asarray((self.errors < _GOOD_ERROR) & (self.gains > 0))
 
     @property
+    def goes_along(self) -> Array:
+        """Whether each run is as it moves, not turned, as far as it explains something of it (runs,)."""
+        return np.asarray((self.errors < POOR_ERROR) & (self.gains > 0))
+
+    @property
     def is_misread(self) -> Array:
         """Whether each run reads as no sensor does (runs,)."""
         return np.abs(np.log(np.where(self.explains, self.gains, 1.0))) > np.log(self.least)

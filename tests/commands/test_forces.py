@@ -740,6 +740,19 @@ def test_a_short_record_follows_its_force_though_its_mode_moves_with_amplitude(t
 
 
 @pytest.mark.slow
+def test_waves_below_the_bounce_of_a_rig_that_nobody_knows_say_nothing_of_its_way_up(tmp_path: Path) -> None:
+    """A shaken mass that rubs, whose spring may be anything: nothing moves it below the bounce of its file."""
+    fast = sosfiltfilt(butter(4, (5, 25), "bandpass", fs=RATE_HZ, output="sos"),
+                       np.random.default_rng(5).standard_normal(len(TIME_S)))
+    base = Course(RATE_HZ, 8e-4 * fast / fast.std() * np.minimum(1.0, np.minimum(TIME_S, TIME_S[::-1])) ** 2)
+    (tmp_path / "bench.yaml").write_text(
+        "name: bench\nmodel: single_mass\nmass_kg: 2.5\nstiffness_n_per_m: unknown\ndamping_n_s_per_m: unknown\n")
+    seen = Bench(2.5, 5200.0, 9.0, guide_n=2.0).moved(base, NOTHING, NOTHING)["accel_z_mps2"]
+    run = written(tmp_path / "run", {"accel_z_mps2": seen}, {"elevation_m": base(TIME_S)}, "source: bench\n")
+    assert main(["compare", "--vehicle", str(tmp_path / "bench.yaml"), str(run)]) == 0
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize(("read", "pushed", "words"), [
     (1 / 9.80665, 1.0, r"0\.10\d times .* it looks like accel_z_mps2 in g \("),
     (1.0, 1e-3, r"found accel_z_mps2 9\d\d times .* it looks like accel_z_mps2 in mm/s2 or force_n in kN \("),

@@ -106,7 +106,7 @@ def check_model(word: str, model: CarModel, runs: SimulatedRuns, warn: Callable[
     followed = _followed(runs, predictions, car, tolerance)
     rig = _likeliest_rig(model, runs, predictions, tolerance)
     # One after the other: whether it is the car is asked of runs that are right, and takes seconds.
-    _say(chain(_other_ways_up(runs, followed), _other_units(runs, followed),
+    _say(chain(_other_ways_up(followed, rig), _other_units(runs, followed),
                _other_units_on_rig(runs, rig), _other_units_of_signals(runs, predictions),
                _other_roads(runs, followed, car),
                _another_car(word, model, runs, predictions, known, tolerance.largest)), warn, anyway)
@@ -203,10 +203,13 @@ def _moves(run: Run, prediction: Array) -> bool:
     return float(model @ model) >= _MODEL_CHECKS_LEAST_MPS2**2 * len(model)
 
 
-def _other_ways_up(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
-    """Which runs are upside down."""
-    for (run, _), around, below in zip(followed.pairs, followed.around, followed.below_at_hand, strict=True):
-        if below.is_upside_down or (around.is_upside_down and below.turned > below.correlation):
+def _other_ways_up(followed: _Followed, rig: LikeliestRig | None) -> Iterator[str]:
+    """Which runs are upside down: none that a rig that the file allows goes along with. (Where nothing moved it
+    below the bounce of a file that does not know its spring, a few waves of noise correlate with any sign.)"""
+    upright = [False] * len(followed.pairs) if rig is None else rig.goes_along[: len(followed.pairs)]
+    for (run, _), around, below, known in zip(followed.pairs, followed.around, followed.below_at_hand, upright,
+                                              strict=True):
+        if not known and (below.is_upside_down or (around.is_upside_down and below.turned > below.correlation)):
             yield (f"{run.name}: expected {run.facts.main.name} up positive, found them upside down: with the sign "
                    f"changed they follow the model (correlation {max(around.turned, below.turned):.2f})")
 
