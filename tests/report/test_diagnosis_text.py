@@ -195,7 +195,8 @@ def test_what_is_nearly_named_is_said_with_the_drive_that_would_show_it() -> Non
 
 
 def test_what_was_added_and_dropped_again_is_named() -> None:
-    steps = (*FOUND.steps[:2], ErrorStep("with tire_damping", 0.2), *FOUND.steps[2:])
+    steps = (*FOUND.steps[:2], ErrorStep("with tire_damping", 0.2), *FOUND.steps[2:],
+             ErrorStep("with the final model", 0.1))
     assert diagnosis_summary(replace(FOUND, steps=steps))[-1] == (
         "Tried and dropped: tire_damping (the effects above explain the same, or it explains little of what is left).")
     assert not any("dropped" in one for one in diagnosis_summary(FOUND))

@@ -326,8 +326,8 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
     lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
                            "{} with the vehicle's file unchanged, {} finally, noise floor about {}")
     lines += _faint(found)
-    tried = [step.words.removeprefix("with ") for step in found.steps if step.words.startswith("with ")]
-    dropped = [name for name in tried if name not in found.verdict]
+    dropped = [name for name in (step.words.removeprefix("with ") for step in found.steps)
+               if name in found.catalogue and name not in found.verdict]
     if dropped:
         why = ("the effects above explain the same" if found.verdict else
                "its parameter ended at a bound, or at the value where the effect vanishes")

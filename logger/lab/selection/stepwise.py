@@ -335,19 +335,19 @@ class Search(Generic[M, P, F]):
         sought beside them, and they are taken where they are likelier."""
         found = self._begun(before)
         refined = [one.effect for one in found.now.effects[self.present:] if not one.is_plain]
-        if not refined or found.now.explanation == 0 or self.likelihood.leaves_noise(found.now):
+        if not refined or not self._leaves_more_than_noise(found.now):
             return found
         self.progress(f"is it {' and '.join(one.name for one in refined)}, or others together?")
         rest = replace(self, effects=[one for one in self.effects if one not in refined], _promising=set(), _rivals={})
-        other = self._on_top_of(rest.run(found.before))
+        other = rest.run(found.before)
+        if self._leaves_more_than_noise(other.now):
+            other = self.go_on(other)
         if other.now.score > found.now.score - INDISTINGUISHABLE:
             return found
         return replace(other, first=found.first) if other.before is found.before else other
 
-    def _on_top_of(self, found: Selection[M, P, F]) -> Selection[M, P, F]:
-        """What a search with fewer effects found, with more, where it leaves more than noise."""
-        rests = found.now.explanation == 0 or self.likelihood.leaves_noise(found.now)
-        return found if rests else self.go_on(found)
+    def _leaves_more_than_noise(self, now: M) -> bool:
+        return now.explanation > 0 and not self.likelihood.leaves_noise(now)
 
     def _begun(self, before: M) -> Selection[M, P, F]:
         """The search without a second look at its refinements."""
@@ -435,7 +435,7 @@ class Search(Generic[M, P, F]):
                             ) -> tuple[F | None, M | None, SearchRound[P, F]]:
         """As ``_with_refinements``, with the plain form of one of some effects, where the model leaves more than noise;
         and the round on that."""
-        for name in names if now.explanation and not self.likelihood.leaves_noise(now) else ():
+        for name in names if self._leaves_more_than_noise(now) else ():
             if (plain := self.likelihood.plain(now, name)) is not None:
                 tried = self.round(plain, untried)
                 best, grown = self._with_refinements(now, plain, tried)
