@@ -149,9 +149,10 @@ AXLE = Parameter("axle", 0.0, 0.0, 2.0, None, Scale.LINEAR, (0.0,), "where it ac
 
 STATIC_RATIO = Parameter("static_to_sliding_ratio", 1.5, 1.0, 10.0, None, Scale.LINEAR, (1.5,),
                          "friction at rest over friction in motion", default=1.0)
-STRIBECK_VELOCITY = Parameter("stribeck_velocity_m_per_s", 0.05, 1e-5, 10.0, None, Scale.LOG, (0.05,),
+STRIBECK_VELOCITY = Parameter("stribeck_velocity_m_per_s", 0.05, 1e-5, 0.1, None, Scale.LOG, (0.05,),
                               "rate at which the excess of friction at rest has fallen to 1 / e", default=0.05)
-"""Of a friction that holds more than it rubs."""
+"""Of a friction that holds more than it rubs. Range of the rate: B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit,
+Automatica 30 (1994); what falls over faster motions is a damper's valve."""
 
 
 @dataclass(frozen=True)

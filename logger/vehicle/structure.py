@@ -201,8 +201,10 @@ class Structure:
 
     @cached_property
     def slowest_decay_per_s(self) -> float:
-        """By which the slowest of its free motions dies down; 0 of what nothing brings back or slows."""
-        return -float(np.linalg.eigvals(self._state_space[0]).real.max())
+        """By which the slowest of its free motions dies down; 0 of what nothing brings back or slows. Where no spring
+        holds a place, each is a place of rest and no motion."""
+        unheld = len(self.mass) - int(np.linalg.matrix_rank(self.stiffness))
+        return -float(np.sort(np.linalg.eigvals(self._state_space[0]).real)[-1 - unheld])
 
     def output_matrices(self, outputs: Sequence[Output]) -> tuple[Array, Array]:
         """C (p, 2n) and D (p, u) of y = C x + D z, for p outputs and the state of ``state_space``."""

@@ -7,7 +7,7 @@ from scipy import linalg, signal
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.models import GOLDEN_CAR, half_car, quarter_car
-from logger.vehicle.structure import driven_outputs, matrix_exponential, recursion, straight_step
+from logger.vehicle.structure import driven_outputs, mass_on_base, matrix_exponential, recursion, straight_step
 
 A, B = half_car(read_vehicle(vehicle_file("rav4-2009"))).state_space()
 
@@ -54,3 +54,11 @@ def test_outputs_equal_those_of_single_steps(count: int) -> None:
     for row, force in zip(found, [*inputs, np.zeros(4)], strict=True):
         assert row == pytest.approx(observe @ state, rel=1e-9, abs=1e-9)
         state = transition @ state + gain @ force
+
+
+@pytest.mark.parametrize(("stiffness_n_per_m", "damping_n_s_per_m", "per_s"), [
+    (0.0, 200.0, 2.0), (0.0, 0.0, 0.0), (1e4, 20.0, 0.1), (1.0, 200.0, 1.0 - 0.99**0.5)])
+def test_the_slowest_motion_of_a_mass_is_that_of_its_poles_not_its_place_where_no_spring_holds_it(
+        stiffness_n_per_m: float, damping_n_s_per_m: float, per_s: float) -> None:
+    mass = mass_on_base(100.0, stiffness_n_per_m, damping_n_s_per_m)
+    assert mass.slowest_decay_per_s == pytest.approx(per_s, rel=1e-9, abs=1e-12)
