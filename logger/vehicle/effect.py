@@ -147,12 +147,15 @@ AXLE = Parameter("axle", 0.0, 0.0, 2.0, None, Scale.LINEAR, (0.0,), "where it ac
                  "0 at both", choices=(0.0, 1.0, 2.0), default=0.0, given=True)
 """Of an effect of suspensions, which may sit in those of one axle alone. A search tries both, and then each."""
 
+TRANSITION_VELOCITY = Parameter("transition_velocity_m_per_s", 0.02, 0.0, 0.1, None, Scale.LINEAR, (0.0, 0.003, 0.02),
+                                "rate at which the friction reaches 76 % of its force, tanh(1); 0: at once",
+                                default=0.0, step=0.0003)
 STATIC_RATIO = Parameter("static_to_sliding_ratio", 1.5, 1.0, 10.0, None, Scale.LINEAR, (1.5,),
                          "friction at rest over friction in motion", default=1.0)
 STRIBECK_VELOCITY = Parameter("stribeck_velocity_m_per_s", 0.05, 1e-5, 0.1, None, Scale.LOG, (0.05,),
                               "rate at which the excess of friction at rest has fallen to 1 / e", default=0.05)
-"""Of a friction that holds more than it rubs. Range of the rate: B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit,
-Automatica 30 (1994); what falls over faster motions is a damper's valve."""
+"""Of a friction: how fast it grows, and whether it holds more than it rubs. Rates within which friction changes: B.
+Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994); what changes over higher ones is a damper."""
 
 
 @dataclass(frozen=True)

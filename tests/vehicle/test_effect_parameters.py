@@ -56,7 +56,7 @@ def test_an_effect_is_at_a_bound_by_its_shape_and_not_by_its_strength() -> None:
     assert not chosen(people, people.usual | {"mass_kg": highest["mass_kg"]}).at_bound
     friction, rate = EFFECTS["dry_friction"], "transition_velocity_m_per_s"
     assert not chosen(friction, friction.usual | {rate: 0.0}).at_bound  # Coulomb's, as it is when nothing is said
-    assert chosen(friction, friction.usual | {rate: 0.2}).at_bound  # a valve's
+    assert chosen(friction, friction.usual | {rate: 0.1}).at_bound  # a valve's
 
 
 def test_every_number_is_free_from_where_it_stands() -> None:

@@ -372,13 +372,12 @@ def _recorder_slopes(prediction: Array, rise: Array, run: Run) -> Array:
 
 
 def derivative(samples: Array, rate_hz: float) -> Array:
-    """Derivative of evenly spaced samples (n,), n > 24, within 0.03 % up to a third of their rate: central differences
-    of order 48 (B. Fornberg, Mathematics of Computation 51, 1988). The difference of two neighbours would give half of
-    it at 30 Hz."""
+    """Derivative of evenly spaced samples (n,), within 0.03 % up to a third of their rate: central differences of order
+    48 (B. Fornberg, Mathematics of Computation 51, 1988). The difference of two neighbours would give half of it at
+    30 Hz."""
     taps = _difference_taps(24)
-    half = len(taps) // 2
-    before, after = 2 * samples[:1] - samples[half:0:-1], 2 * samples[-1:] - samples[-2 : -half - 2 : -1]
-    return np.asarray(np.convolve(np.concatenate([before, samples, after]), taps, mode="valid") * rate_hz)
+    past_ends = np.pad(samples, len(taps) // 2, mode="reflect", reflect_type="odd")
+    return np.asarray(np.convolve(past_ends, taps, mode="valid") * rate_hz)
 
 
 @cache

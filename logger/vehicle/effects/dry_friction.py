@@ -8,7 +8,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from logger.vehicle.effect import AXLE, STATIC_RATIO, STRIBECK_VELOCITY, ForceEffect, Parameter, Scale, Values
+from logger.vehicle.effect import (
+    AXLE,
+    STATIC_RATIO,
+    STRIBECK_VELOCITY,
+    TRANSITION_VELOCITY,
+    ForceEffect,
+    Parameter,
+    Scale,
+    Values,
+)
 from logger.vehicle.laws import CornerLaws, Stribeck
 
 
@@ -17,10 +26,7 @@ class DryFriction(ForceEffect):
     parameters = (
         Parameter("friction_force_n", 60.0, 0.0, 2000.0, 0.0, Scale.LINEAR, (20.0, 60.0, 180.0),
                   "of each suspension, or of the part"),
-        Parameter("transition_velocity_m_per_s", 0.02, 0.0, 0.2, None, Scale.LINEAR, (0.0, 0.003, 0.02),
-                  "rate at which the friction reaches 76 % of its force, tanh(1); 0: at once", default=0.0,
-                  step=0.0003),
-        STATIC_RATIO, STRIBECK_VELOCITY,
+        TRANSITION_VELOCITY, STATIC_RATIO, STRIBECK_VELOCITY,
         AXLE,
     )
     source = "M. Mitschke, H. Wallentowitz, Dynamik der Kraftfahrzeuge (2014), chapter on suspension friction"

@@ -14,7 +14,16 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from logger.vehicle.effect import STATIC_RATIO, STRIBECK_VELOCITY, ForceEffect, Parameter, Scale, Sought, Values
+from logger.vehicle.effect import (
+    STATIC_RATIO,
+    STRIBECK_VELOCITY,
+    TRANSITION_VELOCITY,
+    ForceEffect,
+    Parameter,
+    Scale,
+    Sought,
+    Values,
+)
 from logger.vehicle.laws import CornerLaws, Stribeck
 
 
@@ -25,10 +34,7 @@ class FrameFriction(ForceEffect):
                   "of each wheel carrier, or of a single mass, against its guide"),
         Parameter("body_friction_force_n", 10.0, 0.0, 2000.0, None, Scale.LINEAR, (0.0, 10.0),
                   "of the body against its guide, at each suspension", default=0.0),
-        Parameter("transition_velocity_m_per_s", 0.02, 0.0, 0.2, None, Scale.LINEAR, (0.0, 0.003, 0.02),
-                  "speed at which the friction reaches 76 % of its force, tanh(1); 0: at once", default=0.0,
-                  step=0.0003),
-        STATIC_RATIO, STRIBECK_VELOCITY,
+        TRANSITION_VELOCITY, STATIC_RATIO, STRIBECK_VELOCITY,
     )
     against_ground = True
     source = "B. Armstrong-Helouvry, P. Dupont, C. Canudas de Wit, Automatica 30 (1994) 1083: friction in guides"
