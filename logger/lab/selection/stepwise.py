@@ -331,8 +331,7 @@ class Search(Generic[M, P, F]):
 
     def run(self, before: M) -> Selection[M, P, F]:
         """Search on top of a fitted model. Where it ends with refinements of an effect and leaves more than noise, they
-        may imitate others together, and itself in its plain form: the others are sought without that effect, then it is
-        sought beside them, and they are taken where they are likelier."""
+        may imitate others together: these are sought without that effect, and taken where they are likelier."""
         found = self._begun(before)
         refined = [one.effect for one in found.now.effects[self.present:] if not one.is_plain]
         if not refined or not self._leaves_more_than_noise(found.now):
@@ -340,8 +339,6 @@ class Search(Generic[M, P, F]):
         self.progress(f"is it {' and '.join(one.name for one in refined)}, or others together?")
         rest = replace(self, effects=[one for one in self.effects if one not in refined], _promising=set(), _rivals={})
         other = rest.run(found.before)
-        if self._leaves_more_than_noise(other.now):
-            other = self.go_on(other)
         if other.now.score > found.now.score - INDISTINGUISHABLE:
             return found
         return replace(other, first=found.first) if other.before is found.before else other
