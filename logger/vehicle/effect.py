@@ -431,7 +431,8 @@ class Chosen:
             return True
         shapes = [one for one in numbers if one.null is None]
         return len(shapes) < len(numbers) and any(
-            one.at_bound(self.values[one.name]) and self.values[one.name] != one.default for one in shapes)
+            one.is_at(end, self.values[one.name])
+            for one in shapes for end in (one.low, one.high) if end != one.default)
 
     @property
     def is_plain(self) -> bool:
