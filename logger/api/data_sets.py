@@ -402,8 +402,8 @@ def improved(vehicle: Path, runs: Sequence[Path]) -> Improved:
     """What the lab makes of a rig: ``diagnose`` once, then ``add-effect`` for each that it names, kept if it helps."""
     diagnosis = diagnose(vehicle, runs)
     model, refitted, added = read_vehicle(vehicle), None, list[AddedEffect]()
-    for one in diagnosis.found.missing:
-        found = add_effect(one.effect.name, model, runs, start=one.refined)
+    for missing in diagnosis.found.missing:
+        found = add_effect(missing.effect.name, model, runs, start=missing.refined)
         refitted = refitted or model.with_numbers({one.name: one.without for one in found.numbers})
         if found.helps:
             model = found.model

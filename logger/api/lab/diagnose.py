@@ -172,7 +172,7 @@ def _next(question: DiagnoseQuestion, bench: Bench, found: LabDiagnosis) -> str:
 
 
 def _asked(name: str, one: Chosen) -> str:
-    """An effect as an argument of add-effect: with its refinements, which only that frees."""
+    """An effect as add-effect takes it, which frees refinements only where their values are given."""
     values = ",".join(f"{each}={value:.3g}" for each, value in one.refined.items())
     return f"{name}:{values}" if values else name
 
