@@ -307,7 +307,7 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
     colour = None if shape is None or excess <= UNEXPLAINED else coloured_noise(fine.bands, shape)
     if colour is not None:
         noise, excess_of = colour, excess_by_signal(fine, state, FALSE_ALARM, colour)
-        excess = max(excess_of.values())
+        excess, over_noise = max(excess_of.values()), 0.0
     left_open = _left_open(fine, state, errors)
     candidates, no_better = candidates_of(search, selection, state.effects,
                                           partial(_best_of_screened, selection.before))

@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from logger.api.lab.diagnose import diagnosis_blocks, diagnosis_json, diagnosis_summary, looks_like, table, untested
+from logger.api.lab.question import DiagnoseQuestion
 from logger.lab.diagnosis import ALREADY_PRESENT, CandidateEffect, LabDiagnosis
 from logger.lab.likelihood.noise_floor import NoiseLevel
 from logger.lab.residual_tests import run_residual_tests
@@ -98,6 +99,19 @@ def test_beside_something_unexplained_it_is_only_part_or_an_imitation() -> None:
     assert missing.startswith("dry_friction is missing")  # a hundred times what is left
     assert left == ("Something more is missing that no known effect explains: in the worst run the residual is 1.5 "
                     "times the sensor's noise. Beyond that noise it is less than 0.1% of the measured power.")
+
+
+def test_times_the_noise_are_times_the_noise_alone() -> None:
+    """Also where the residual exceeds what calibrated sensors leave."""
+    _, left, *_ = diagnosis_summary(replace(FOUND, excess=2.9, over_noise=37.0))
+    assert "the residual is 38 times the sensor's noise" in left
+
+
+def test_the_next_command_is_asked_as_this_one_was() -> None:
+    asked = DiagnoseQuestion("rig.yaml", ["run"], tolerance="unknown", low_pass_hz=20.0, anyway=True)
+    assert asked.command("learn {} --out law.py") == (
+        "ridelog learn --vehicle rig.yaml --tolerance unknown --low-pass 20.0 --anyway --out law.py run")
+    assert asked.command("identify {}", in_lab=False) == "ridelog identify --vehicle rig.yaml run"
 
 
 def test_what_calibrated_sensors_may_leave_above_their_noise_is_said_too() -> None:

@@ -164,10 +164,11 @@ def _next(question: DiagnoseQuestion, bench: Bench, found: LabDiagnosis) -> str:
     if found.beyond and not found.exceeds_noise:
         words = (f"Next: check {', '.join(found.beyond)} in the vehicle's file. This command fits them to the runs "
                  "alone:")
-        return wrapped([words]) + "\n" + question.command(f"identify --free {','.join(found.beyond)} {{}}")
+        return wrapped([words]) + "\n" + question.command(
+            f"identify --free {','.join(found.beyond)} {{}}", in_lab=False)
     if found.unexplained:
-        return wrapped(["Next: look at the shape above. An effect of your own is one Python file (--effect-file); "
-                           "ridelog compare shows where the residual is."])
+        own = "".join(f" --effect-file {one}" for one in question.effect_files)
+        return "Next: " + question.command(f"learn {{}}{own} --out law.py")
     return "Next: nothing. Runs that excite the effects listed as undetected would test the model further."
 
 
@@ -307,7 +308,7 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
                      "large motion, so the motion does not cause it.")
     if found.exceeds_noise:
         lines.append(f"Something {'more ' * bool(found.missing)}is missing that no known effect explains: in the worst "
-                     f"run the residual is {_left_over(found, found.excess)}.")
+                     f"run the residual is {_left_over(found)}.")
         if found.contradicted_by:
             lines.append(f"It appears only in {enumerated(found.contradicted_by, 'and')}; the model explains the other "
                          "signals down to their noise. Check that sensor's position, sign and filter.")
@@ -315,8 +316,8 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
             lines.append(f"ridelog names no effect that gains less than {IMITATION:.0%} of what a full explanation "
                          "would: it may only imitate what is missing.")
     elif found.within_calibration:
-        lines.append(f"In the worst run the residual is {_left_over(found, found.over_noise)}: calibration errors of "
-                     "the sensors may leave as much.")
+        lines.append(f"In the worst run the residual is {_left_over(found)}: calibration errors of the sensors may "
+                     "leave as much.")
     lines += [f"{name} is {share:+.1%} off against all other signals, more than a calibration error: check its scale "
               "and its unit. The search for effects corrected it."
               for name, share in found.signals_off.items()]
@@ -335,8 +336,9 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
     return lines
 
 
-def _left_over(found: LabDiagnosis, over: float) -> str:
+def _left_over(found: LabDiagnosis) -> str:
     left = percent(max(found.final_error**2 - found.noise_floor_error**2, 0.0))
+    over = max(found.excess, found.over_noise)
     return f"{1 + over:.3g} times the sensor's noise. Beyond that noise it is {left} of the measured power"
 
 
@@ -459,7 +461,8 @@ def table(found: LabDiagnosis | UnknownRoadDiagnosis) -> Iterator[tuple[str, str
 def diagnosis_json(found: LabDiagnosis) -> dict[str, Any]:
     """The diagnosis as one JSON object."""
     return {
-        **_common_json(found), "judged_on": JUDGED_ON, "groups": groups(found),
+        **_common_json(found), "residual_over_noise": 1 + max(found.excess, found.over_noise),
+        "judged_on": JUDGED_ON, "groups": groups(found),
         "starts": {name: {"ended_there": there, "of": count} for name, (there, count) in found.ends.items()},
         "contradicted": list(found.contradicted),
         "beyond_tolerance": dict(found.beyond),

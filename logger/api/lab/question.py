@@ -28,11 +28,15 @@ class LabQuestion(question.LongQuestion):
         given: Any = self
         return [*super().files_read(), *shared_fields.files_of(given.vehicle)]
 
-    def command(self, words: str) -> str:
-        """A command line about the same vehicle and runs."""
+    def command(self, words: str, in_lab: bool = True) -> str:
+        """A command line about the same vehicle and runs; of a verb of the lab with the same options."""
         given: Any = self
-        runs = " ".join(map(str, shared_fields.paths_of(given.runs)))
-        return f"ridelog {words.format(f'--vehicle {given.vehicle}')} {runs}"
+        said = [f"--vehicle {given.vehicle}"]
+        if in_lab:
+            said += [f"{flag} {value}" for flag, value in (
+                ("--tolerance", self.tolerance), ("--low-pass", self.low_pass_hz)) if value is not None]
+            said += ["--anyway"] * self.anyway
+        return f"ridelog {words.format(' '.join(said))} {' '.join(map(str, shared_fields.paths_of(given.runs)))}"
 
 
 @dataclass(frozen=True)
