@@ -1,4 +1,9 @@
-"""A damping that goes with the travel: F = f |x / x0|^n v / v0."""
+"""A damping that goes with the travel: F = f |x / x0|^n v / v0.
+
+Of a part alone on its bench such a damping may also follow a smooth curve of the travel, which multiplies the force of
+the damper with all that is known of it: fluid that goes past the piston through grooves or tubes has its way only where
+these are.
+"""
 
 from __future__ import annotations
 
@@ -13,6 +18,7 @@ class DampingByTravel(Family):
     signature = "the damping is larger far from rest than near it"
     shown_by = "drive a rough road slowly, so that the suspension travels far at different rates"
     straight_at = 0.0
+    points = 3, 5  # on either side of rest, which is one
 
     def drafts(self, context: LawContext) -> list[Draft]:
         travel_m, rate_mps = context.reach("travel_m", 0.95), context.reach("rate_mps", 0.95)
@@ -26,11 +32,38 @@ def force_n(p, travel_m, rate_mps):
             Parameter("force_n", size_n, 0.0, 100 * size_n, 0.0, Scale.LINEAR, (size_n,),
                       f"at {1000 * travel_m:g} mm and {rate_mps:g} m/s"),
             Parameter("power_ratio", 1.0, 0.3, 6.0, None, Scale.LOG, (1.0, 2.0), "exponent of the travel"))
-        return [self.draft(parameters, "def laws(self, p, laws):\n"
+        power = self.draft(parameters, "def laws(self, p, laws):\n"
                            "    return laws.with_force(lambda travel_m, rate_mps: force_n(p, travel_m, rate_mps))",
-                           functions, at="loop", reference=travel_m)]
+                           functions, at="loop", reference=travel_m)
+        curves = self.points if context.vehicle.model == "component" else ()
+        return [power, *(self._curve(count, context.reach("travel_m", 0.995)) for count in curves)]
+
+    def _curve(self, count: int, reach_m: float) -> Draft:
+        """A damping that follows a curve through so many points on either side of rest."""
+        places = [sign * rounded(reach_m * one / count) for sign in (-1, 1) for one in range(1, count + 1)]
+        names = {one: f"more_{number}_ratio" for number, one in enumerate(sorted(places), 1)}
+        at = sorted([*places, 0.0])
+        functions = f"""
+AT = np.array([{', '.join(repr(one) for one in at)}])
+
+
+def more(p, travel_m):
+    through = np.array([
+        {', '.join(f'p.{names[one]}' if one in names else '0.0' for one in at)}])
+    return PchipInterpolator(AT, through)(np.clip(travel_m, AT[0], AT[-1]))
+"""
+        parameters = tuple(Parameter(
+            name, trial := rounded(abs(one) / at[-1]), -1.0, 100.0, 0.0, Scale.LINEAR, (trial,),
+            f"damping at {1000 * one:g} mm over that at rest, less 1", step=0.02) for one, name in names.items())
+        return self.draft(parameters, "def laws(self, p, laws):\n    return laws.with_force("
+                          "lambda travel_m, rate_mps: more(p, travel_m) * laws.damper(rate_mps))", functions,
+                          variant=f"curve through {len(at)} points", at="loop", reference=at[-1])
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
+        if draft.variant:
+            ends = (f"{say(one.name)} more at {one.meaning.split(' at ')[1].split(' over ')[0]}"
+                    for one in (draft.parameters[0], draft.parameters[len(draft.strengths) - 1]))
+            return f"damping that follows a curve of the travel: over that at rest {' and '.join(ends)}"
         return (f"damping that grows with the travel to the power {say('power_ratio')}: "
                 f"{say('force_n')} at {draft.parameters[0].meaning.removeprefix('at ')}")
 
