@@ -230,9 +230,25 @@ class LabDiagnosis:
         return next(one for one in self.candidates if one.effect.name == name)
 
 
+@dataclass(frozen=True, eq=False)
+class Searched:
+    """A search for effects that has ended, on what, and the diagnosis by its result."""
+
+    posterior: Posterior
+    search: Search[Baseline, Screened, CandidateFit]
+    selection: Selection[Baseline, Screened, CandidateFit]
+    diagnosis: LabDiagnosis
+
+
 def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
              progress: Progress = lambda words: None, last: Mapping[str, Effect] = MappingProxyType({})
              ) -> LabDiagnosis:
+    """The diagnosis of ``search_to_the_last``."""
+    return search_to_the_last(posterior, effects, present, progress, last).diagnosis
+
+
+def search_to_the_last(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen],
+                       progress: Progress, last: Mapping[str, Effect]) -> Searched:
     """Find the effects of ``effects`` that the model, with those that are ``present``, lacks; where these leave
     something unexplained, also of those that are tried ``last``.
 
@@ -244,16 +260,16 @@ def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Seque
         progress("the records were filtered forwards and backwards: searching below that frequency")
         posterior = below
         search, selection = search_effects(posterior, effects, present, progress)
-    found = assess(posterior, effects, present, search, selection)
+    found = Searched(posterior, search, selection, assess(posterior, effects, present, search, selection))
     tried = {name: one for name, one in last.items() if name not in obstacles_of(posterior, last, present)}
-    if not (tried and (found.exceeds_noise or found.within_calibration)):
+    if not (tried and (found.diagnosis.exceeds_noise or found.diagnosis.within_calibration)):
         return found
     progress(f"something is left unexplained: searching with {' and '.join(tried)}, too")
     search, selection = search.with_more(selection, [*tried.values()])
     if not {*selection.gains} & {*tried}:
         return found
     more = assess(posterior, {**effects, **last}, present, search, selection)
-    return more if {*more.verdict} & {*tried} else found
+    return Searched(posterior, search, selection, more) if {*more.verdict} & {*tried} else found
 
 
 def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),

@@ -24,14 +24,14 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from logger.lab.diagnosis import LabDiagnosis, assess, exceeds_noise, obstacles_of, search_effects
+from logger.lab.diagnosis import LabDiagnosis, assess, exceeds_noise, search_to_the_last
 from logger.lab.laws.draft import LEARNED, Draft, Family, LawContext
 from logger.lab.likelihood.noise_floor import SURE_SIGMA
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.standard_errors import deviations_from_null, standard_errors
 from logger.lab.selection.evidence import INDISTINGUISHABLE, min_gain
 from logger.lab.selection.screening import Baseline
-from logger.lab.selection.stepwise import UNTRIED, Search, Selection, is_outside_data
+from logger.lab.selection.stepwise import UNTRIED, Fitted, Search, Selection, is_outside_data
 from logger.vehicle.effect import Chosen, Effect, ForceEffect
 from logger.vehicle.uncertain import NumberErrors
 
@@ -196,31 +196,29 @@ def learn(posterior: Posterior, effects: Mapping[str, Effect], families: Mapping
 
     ValueError where the vehicle lacks what an effect needs.
     """
-    search, selection = search_effects(posterior, effects, present, progress)
     last = {name: one for name, one in known.items() if one.sought_last and name not in effects}
-    last = {name: one for name, one in last.items() if name not in obstacles_of(posterior, last, present)}
-    if last and exceeds_noise(selection.now):
-        search, selection = search.with_more(selection, [*last.values()])
-        effects = {**effects, **last}
-    laws = FamilySearch(search, selection, families, known)
-    law = laws.best()
-    diagnosis = assess(posterior, effects, present, search, selection) if law is None else None
-    verdict = tuple(selection.gains) if diagnosis is None else diagnosis.verdict
-    left = exceeds_noise(selection.now) if diagnosis is None else diagnosis.unexplained
-    refused = laws.refusal_to_report() if law is None else None
-    if refused is not None and refused.known is not None:
-        better = refused.known.one.effect.name
-        verdict = (better, *(name for name in verdict if name != better))
+    searched = search_to_the_last(posterior, effects, present, progress, last)
+    laws = FamilySearch(searched.search, selection := searched.selection, families, known)
+    law, diagnosis = laws.best(), searched.diagnosis
+    if law is None and laws.better_known:
+        search, selection = laws.with_better_known()
+        diagnosis = assess(searched.posterior, {**effects, **{one.name: one for one in search.effects}}, present,
+                           search, selection)
     context = LawContext(selection.before.posterior, selection.before.state)
-    return Learning(law, context, verdict, selection.now.hold_out.error, left, diagnosis, refused)
+    if law is not None:
+        return Learning(law, context, tuple(selection.gains), selection.now.hold_out.error,
+                        exceeds_noise(selection.now), None)
+    return Learning(None, context, diagnosis.verdict, selection.now.hold_out.error, diagnosis.unexplained, diagnosis,
+                    laws.refusal_to_report())
 
 
 @dataclass(frozen=True, eq=False)
 class FamilySearch:
     """A search among laws, after one among the known effects.
 
-    refused    laws that say nothing, or less than a known effect, in the order in which they were tried
-    drafts     of the effects that were tried
+    refused         laws that say nothing, or less than a known effect, in the order in which they were tried
+    drafts          of the effects that were tried
+    better_known    fits of the known effects for which laws were refused, in that order
     """
 
     search: Search
@@ -229,6 +227,16 @@ class FamilySearch:
     known: Mapping[str, Effect]
     refused: dict[tuple[str, str], Refusal] = field(default_factory=dict)
     drafts: dict[Effect, Draft] = field(default_factory=dict)
+    better_known: list[Fitted] = field(default_factory=list)
+
+    def with_better_known(self) -> tuple[Search, Selection]:
+        """The first known effect that explains more than a law, in its place, and what else is missing then."""
+        fit = self.better_known[0]
+        search = replace(self.search, effects=[one for one in self.search.effects if one.name != fit.effect.name]
+                         + [fit.effect], _promising=set(), _rivals={})
+        now = self.search.likelihood.with_effect(fit)
+        return search, search.go_on(replace(self.selection, now=now, last=UNTRIED,
+                                            steps=((fit.effect.name, now.hold_out),)))
 
     def refusal_to_report(self) -> Refusal | None:
         """The first refusal for a known effect, which is the better answer, else the first one."""
@@ -294,24 +302,29 @@ class FamilySearch:
         return None
 
     def _with_known(self, found: Selection) -> Selection | None:
-        """A model with a law, and known effects sought on top of it where it leaves something; None where the law is
-        not needed beside these."""
-        if not exceeds_noise(found.now):
+        """A model with a law, and known effects sought on top of it where it leaves something that known effects alone
+        leave too; None where the law is not needed beside these."""
+        if not exceeds_noise(found.now) or not exceeds_noise(self.selection.now):
             return found
-        law, whole = next(one.effect for one in found.now.effects if one.effect in self.drafts), found
-        for effects in (self._known_forces, self.search.effects):
-            if whole is found or (exceeds_noise(whole.now) and len(effects) > len(self._known_forces)):
-                search = replace(self.search, effects=[*effects, law], _promising=set(), _rivals=dict(whole.rivals))
-                whole = search.go_on(whole)
+        law, forces = next(one.effect for one in found.now.effects if one.effect in self.drafts), self._known_forces
+        search = replace(self.search, effects=[*forces, law], _promising=set(), _rivals=dict(found.rivals))
+        whole = search.go_on(found)
+        others = [one for one in self.search.effects if one not in forces]
+        if others and exceeds_noise(whole.now):
+            search = replace(search, effects=[*search.effects, *others], _rivals=dict(whole.rivals))
+            tried = search.round(whole.now, others, beside=whole.last) if whole.last.on is whole.now else None
+            whole = search.go_on(whole, tried)
         return whole if law.name in whole.gains else None
 
     def _law(self, found: Selection) -> Law | None:
         """The law of a model; None where a known effect explains more in its place."""
         one = next(each for each in found.now.effects if each.effect in self.drafts)
         draft, name = self.drafts[one.effect], one.effect.name
-        nearest = self._nearest(found, one, draft)
-        if why := known_instead(draft, nearest):
+        fit = self._nearest_fit(found, one, draft)
+        nearest = None if fit is None else Nearest(fit.chosen, fit.gain, found.gains[name])
+        if fit is not None and (why := known_instead(draft, nearest)):
             self.refused[draft.key] = why
+            self.better_known.append(fit)
             return None
         others = tuple(each for each in found.now.effects[self.search.present:] if each is not one)
         rivals = tuple(self.families[each.removeprefix(LEARNED)] for each in found.rivals.get(name, ())
@@ -320,13 +333,11 @@ class FamilySearch:
         return Law(draft, one, others, found.now.state, found.gains[name], before - now, before - found.now.score,
                    rivals, nearest)
 
-    def _nearest(self, found: Selection, one: Chosen, draft: Draft) -> Nearest | None:
-        """The known effect that gains most in the place of the law, of those related to its family."""
+    def _nearest_fit(self, found: Selection, one: Chosen, draft: Draft) -> Fitted | None:
+        """Of the known effect that gains most in the place of the law, of those related to its family."""
         without = self.search.without(found.now, draft.name)
         related = [self.known[name] for name in draft.family.related_effects
                    if name in self.known and name not in without.state.names]
         self.search.progress(f"which known effect comes close to {draft.family.title}")
         fits = replace(self.search, effects=related).round(without, related, one).fits if related else ()
-        if not fits or fits[0].gain <= 0:
-            return None
-        return Nearest(fits[0].chosen, fits[0].gain, found.gains[draft.name])
+        return fits[0] if fits and fits[0].gain > 0 else None
