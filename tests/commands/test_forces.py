@@ -490,6 +490,22 @@ def test_play_of_a_part_that_moves_by_some_gaps_is_found(tmp_path: Path, capsys:
               str(run)])
 
 
+def test_a_law_of_a_travel_is_known_no_better_than_that_travel(tmp_path: Path) -> None:
+    """k x^3 of an x that is read 1 % too large is 3 % too small, whatever the noise: the gain of a displacement sensor is
+    off by a per cent, and so is the force's."""
+    way = noise(3.0, 0.003, 6)
+    x_m = way(TIME_S)
+    force_n = 4000.0 * x_m + 4e8 * x_m**3 + 90.0 * way(TIME_S, 1)
+    force_n += np.random.default_rng(1).normal(0.0, 0.05, len(force_n))
+    run = written(tmp_path / "run", {"force_n": force_n}, {"displacement_m": 1.01 * x_m}, "source: me\n")
+    (tmp_path / "part.yaml").write_text("name: bush\nmodel: component\ndamping_n_s_per_m: 90 +- 30%\npreload_n: 0\n"
+                                        "stiffness_n_per_m: 3500 +- 30%\n")
+    found = ridelog.add_effect("progressive_spring", tmp_path / "part.yaml", [run])
+    name = "cubic_stiffness_n_per_m3"
+    assert found.standard_errors[name] / found.parameters[name] == pytest.approx(np.hypot(0.03, 0.01), rel=0.1)
+    assert abs(found.parameters[name] - 4e8) < 2 * found.standard_errors[name]
+
+
 def test_a_part_is_moved_or_pushed(tmp_path: Path) -> None:
     run = bench_of_a_part(tmp_path)
     text = (run / "excitation.csv").read_text().replace("t_s,displacement_m", "t_s,displacement_m,force_n")

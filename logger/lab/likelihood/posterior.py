@@ -14,6 +14,7 @@ from logger.lab.likelihood.priors import Tolerance, VehiclePrior
 from logger.lab.likelihood.readings import Readings
 from logger.lab.likelihood.signals import bands_of, deviance
 from logger.profiles.excitation import Excitation
+from logger.profiles.track import WheelTracks
 from logger.runs import normalised_rms_error
 from logger.simulation.beginning import Beginning
 from logger.simulation.virtual_drive import SimulatedRuns
@@ -172,13 +173,20 @@ class Posterior:
     def carried_noise(self, state: State, draw: int) -> list[Array]:
         """Changes (n,) of the predictions, per run, by noise like what is still in the measured input of a rig, signals
         joined: what the model makes of it in each. One draw of the noise by its number."""
-        tracks = [one.track for one in self.runs.runs]
-        noisy = [one.with_noise_left(draw, index) if isinstance(one, Excitation) and one.is_noisy else one
-                 for index, one in enumerate(tracks)]  # repeats have noise of their own
-        if all(one is other for one, other in zip(noisy, tracks, strict=True)):
+        return self._changed_by(state, [
+            one.with_noise_left(draw, index) if isinstance(one, Excitation) and one.is_noisy else one
+            for index, one in enumerate(run.track for run in self.runs.runs)])  # repeats have noise of their own
+
+    def carried_gain(self, state: State) -> list[Array]:
+        """The same by one standard deviation of the gain of what measured the input."""
+        return self._changed_by(state, [one.times(1 + self.tolerance.scale) if isinstance(one, Excitation) else one
+                                        for one in (run.track for run in self.runs.runs)])
+
+    def _changed_by(self, state: State, tracks: Sequence[WheelTracks]) -> list[Array]:
+        if all(one is run.track for one, run in zip(tracks, self.runs.runs, strict=True)):
             return [np.zeros_like(one) for one in state.predictions]
         there = self.runs.predict(self.car(state.effects, state.logs), self.distance_error_m(state.record),
-                                  tracks=noisy)
+                                  tracks=tracks)
         return [error.with_recorder_error(one, k) - here for error, one, k, here in zip(
             self.record_errors, there, state.record, state.predictions, strict=True)]
 

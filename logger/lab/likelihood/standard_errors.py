@@ -3,7 +3,8 @@
 On a rig squares are weighed by one level, and the noise of its measured input goes through the model: friction and
 stops make more of it than of all other noise, and the fit follows it. There the covariance is that of the estimates
 themselves (H. White, Econometrica 50, 1982): of the gradient under the noise as it is, between two inverses of the
-information. The noise of the readings has the residual's power in each band; that of the input is drawn.
+information. The noise of the readings has the residual's power in each band; that of the input is drawn. What measured
+the input has a gain as well: lengths and velocities of effects are known no better than the motion.
 
 The numbers of effects differ by many powers of ten (a cubic stiffness has 1e6, a ratio 1), so that the matrix is scaled
 to a diagonal of ones before it is inverted.
@@ -118,13 +119,15 @@ def _scatter(linear: LinearModel, slopes: list[Array] | None) -> Array:
     # The standard error of a standard deviation by so many draws is 1 / sqrt(2 n) of it, a sixth.
     drawn = [posterior.carried_noise(state, draw) for draw in range(18)]
     found = np.zeros((len(columns[0]), len(columns[0])))
-    pulls = np.zeros((len(drawn), len(found)))
+    pulls, gained = np.zeros((len(drawn), len(found))), posterior.carried_gain(state)
+    gain_pull = np.zeros(len(found))
     for run, (bands, residual) in enumerate(zip(posterior.bands, posterior.residuals(state), strict=True)):
         carried = np.mean([bands.power(one[run]) for one in drawn], axis=0)
         own, white = bands.scatter_whitener(residual, carried)(columns[run]), linear.whiteners[run](columns[run])
         pulls += np.stack([linear.whiteners[run](one[run]) for one in drawn]) @ white.T
+        gain_pull += white @ linear.whiteners[run](gained[run])
         found += own @ own.T - white @ white.T
-    return found + pulls.T @ pulls / len(drawn)
+    return found + pulls.T @ pulls / len(drawn) + np.outer(gain_pull, gain_pull)
 
 
 def with_standard_errors(effects: Sequence[Chosen], free_parameters: Sequence[FreeParameter], deviations: Array
