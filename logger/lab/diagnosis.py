@@ -37,7 +37,7 @@ from logger.lab.likelihood.standard_errors import StandardErrors, deviations_fro
 from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.residuals.breakdown import ModelResiduals
 from logger.lab.residuals.fitted_laws import FittedCar, fitted_car
-from logger.lab.residuals.road_coherence import best_linear_share
+from logger.lab.residuals.road_coherence import best_linear_share, share_proportional
 from logger.lab.residuals.unexplained import Removed, Shape, coloured_noise, removed_from, shape_of
 from logger.lab.selection.candidate_fit import CandidateFit
 from logger.lab.selection.detectability import Undetectable, effect_as_moved, undetectable_effects
@@ -107,6 +107,8 @@ class LabDiagnosis:
     excess               share by which the residual is above the noise in the run where it is largest
     over_noise           as ``excess``, but over the noise alone, as if sensors had no gain that may be off; 0 where a
                          test of the residual does not distinguish it from noise
+    proportional         share of the residual's power that is proportional to the model's motion, as what a sensor's
+                         gain leaves is
     beyond               numbers of the car that the runs move beyond their tolerance, with their relative change
     in_conflict          whether one of these is farther off than numbers are by chance
     moved                the others that the runs move for sure: their relative change and its standard error, the
@@ -166,6 +168,7 @@ class LabDiagnosis:
     best_linear: float | None = None
     shows_forces: bool = False
     over_noise: float = 0.0
+    proportional: float = 1.0
 
     @property
     def explained(self) -> tuple[float, float]:
@@ -185,6 +188,12 @@ class LabDiagnosis:
         return self.over_noise > UNEXPLAINED and not self.exceeds_noise
 
     @property
+    def mostly_proportional(self) -> bool:
+        """Whether most of what is left beyond the noise is proportional to the motion."""
+        power = (1 + self.over_noise) ** 2
+        return (1 - self.proportional) * power - 1 < 0.5 * (power - 1)
+
+    @property
     def reaches_floor(self) -> bool:
         """Whether the error on what no fit saw is the noise floor's."""
         return self.steps[-1].error < (1 + UNEXPLAINED) * self.noise_floor_error
@@ -200,13 +209,13 @@ class LabDiagnosis:
         that contradicts its priors: then its effects may imitate another one."""
         return self.in_conflict and self.over_noise > UNEXPLAINED
 
-    def exceeds_imitation(self, name: str) -> bool:
-        """Whether what is left beyond the noise is less than ``IMITATION`` of what an effect of the verdict and that
-        explain together: of so little, the effect is no imitation."""
+    def may_imitate(self, name: str) -> bool:
+        """Whether an effect of the verdict may imitate something else, or be a part of it: what is left beyond the
+        noise is ``IMITATION`` or more of what the effect and that explain together."""
         left = max(self.final_error**2 - self.noise_floor_error**2, 0.0)
         removed = sum(before.error**2 - there.error**2 for before, there in pairwise(self.steps)
                       if there.words == f"with {name}")
-        return left < IMITATION * (removed + left)
+        return self.is_doubtful or (self.exceeds_noise and left >= IMITATION * (removed + left))
 
     @property
     def contradicted_by(self) -> tuple[str, ...]:
@@ -337,7 +346,7 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
                                                                                fine.error(state)),
         candidates=candidates, no_better=no_better,
         obstacles=obstacles_of(posterior, effects, present), verdict=tuple(selection.gains), excess=excess,
-        over_noise=over_noise,
+        over_noise=over_noise, proportional=1.0 if shape is None else share_proportional(shape.residuals),
         beyond=(beyond := fine.prior.beyond_tolerance(state.logs, errors.covariance)),
         in_conflict=fine.prior.is_in_conflict(state.logs, errors.logs),
         moved={name: one for name, one in fine.prior.moved(

@@ -491,8 +491,8 @@ def test_play_of_a_part_that_moves_by_some_gaps_is_found(tmp_path: Path, capsys:
 
 
 def test_a_law_of_a_travel_is_known_no_better_than_that_travel(tmp_path: Path) -> None:
-    """k x^3 of an x that is read 1 % too large is 3 % too small, whatever the noise: the gain of a displacement sensor is
-    off by a per cent, and so is the force's."""
+    """k x^3 of an x that is read 1 % too large is 3 % too small, whatever the noise. Gains of displacement
+    sensors and load cells are off by a per cent."""
     way = noise(3.0, 0.003, 6)
     x_m = way(TIME_S)
     force_n = 4000.0 * x_m + 4e8 * x_m**3 + 90.0 * way(TIME_S, 1)

@@ -119,6 +119,9 @@ def test_what_calibrated_sensors_may_leave_above_their_noise_is_said_too() -> No
     assert missing.startswith("dry_friction is missing")
     assert left == ("In the worst run the residual is 1.5 times the sensor's noise. Beyond that noise it is less than "
                     "0.1% of the measured power: calibration errors of the sensors may leave as much.")
+    _, other, *_ = diagnosis_summary(replace(FOUND, over_noise=9.0, proportional=0.1))
+    assert other.endswith("may leave as much, but most of this is not proportional to the motion, as theirs would be: "
+                          "something small may be missing.")
     nothing, as_much, *_ = diagnosis_summary(replace(NOTHING, over_noise=0.5))
     assert nothing.endswith("the residual is hardly more than calibration errors of the sensors.")
     assert as_much == left

@@ -157,7 +157,7 @@ def _compared(bench: Bench) -> str:
 
 
 def _next(question: DiagnoseQuestion, bench: Bench, found: LabDiagnosis) -> str:
-    if found.missing:
+    if found.missing and not all(map(found.may_imitate, found.verdict)):
         asked = "+".join(_asked(bench.files.get(one.effect.name, one.effect.name), one) for one in found.missing)
         names = "-".join(one.effect.name for one in found.missing)
         return "Next: " + question.command(f"add-effect {asked} {{}} --out with-{names}.yaml")
@@ -316,8 +316,10 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
             lines.append(f"ridelog names no effect that gains less than {IMITATION:.0%} of what a full explanation "
                          "would: it may only imitate what is missing.")
     elif found.within_calibration:
+        of_motion = "." if found.mostly_proportional else (
+            ", but most of this is not proportional to the motion, as theirs would be: something small may be missing.")
         lines.append(f"In the worst run the residual is {_left_over(found)}: calibration errors of the sensors may "
-                     "leave as much.")
+                     f"leave as much{of_motion}")
     lines += [f"{name} is {share:+.1%} off against all other signals, more than a calibration error: check its scale "
               "and its unit. The search for effects corrected it."
               for name, share in found.signals_off.items()]
@@ -417,8 +419,7 @@ def _missing(found: LabDiagnosis, one: Chosen) -> str:
     if name in found.ends:
         there, count = found.ends[name]
         likely += f" The model's parameters were unknown; {there} of {count} starting points led to this result."
-    says = ("is missing" if not found.is_doubtful and (not found.exceeds_noise or found.exceeds_imitation(name)) else
-            "explains part of the residual, or imitates something else")
+    says = "explains part of the residual, or imitates something else" if found.may_imitate(name) else "is missing"
     if candidate.confused_with:
         names = [name, *candidate.confused_with]
         group = f"Either {enumerated(names, 'or')}" if len(names) == 2 else f"One of {enumerated(names, 'and')}"

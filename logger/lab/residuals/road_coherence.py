@@ -10,6 +10,7 @@ variance. Neighbouring frequencies of tapered segments are correlated: every oth
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
 
@@ -66,8 +67,17 @@ class Coherence:
 
 def coherence_with_road(residuals: ModelResiduals) -> Coherence:
     """The coherence of residuals with the road under the wheels that the car has, or with what drives a rig."""
+    return _coherence(residuals, _inputs(residuals))
+
+
+def share_proportional(residuals: ModelResiduals) -> float:
+    """Share of the residual's power that is proportional to the model's motion, at each frequency by a factor of its
+    own, as what a sensor's gain leaves is. (A mode rings in both alike, however short the segments are.)"""
+    return _coherence(residuals, [residuals.model]).explained(LOWEST_HZ, residuals.top_hz)[0]
+
+
+def _coherence(residuals: ModelResiduals, inputs: Sequence[Sequence[Array]]) -> Coherence:
     residual = segments(residuals, residuals.residual)
-    inputs = _inputs(residuals)
     roads = np.stack([segments(residuals, one) for one in inputs], axis=2)
     count = len(residual)
     power = np.mean(np.abs(residual) ** 2, axis=0)

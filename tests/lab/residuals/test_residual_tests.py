@@ -17,7 +17,7 @@ from logger.lab.residual_tests import run_residual_tests
 from logger.lab.residual_tests.tests import ResidualEvidence, ResidualTestResult, ResidualTestResults
 from logger.lab.residuals.breakdown import ModelResiduals, breakdown
 from logger.lab.residuals.force_state_map import force_map
-from logger.lab.residuals.road_coherence import coherence_with_road
+from logger.lab.residuals.road_coherence import coherence_with_road, share_proportional
 from logger.runs import Run
 from logger.simulation.virtual_drive import SimulatedRuns
 
@@ -84,6 +84,14 @@ def test_what_follows_the_road_is_distinguished_from_noise() -> None:
     share, p_value = coherence_with_road(residuals).explained(0.0, 50.0)
     assert share == pytest.approx(0.5, abs=0.05)
     assert p_value < 1e-12
+
+
+def test_what_a_gain_leaves_is_proportional_and_what_a_law_leaves_is_not() -> None:
+    late = beside_with(lambda run, prediction, rng: 0.03 * np.roll(prediction, 1))
+    bent = beside_with(lambda run, prediction, rng: 0.03 * prediction * np.abs(np.roll(prediction, 3)))
+    assert share_proportional(late) > 0.95
+    assert share_proportional(bent) < 0.8
+    assert share_proportional(beside_with(white)) < 0.05
 
 
 def test_a_late_clock_is_distinguished_from_a_wrong_place() -> None:
