@@ -76,7 +76,7 @@ class Excitation:
                             or not np.isfinite(self.force_n).all()):
             raise ValueError(f"excitation: expected finite samples of each of {len(self.forces)} forces")
 
-    @property
+    @cached_property
     def is_still(self) -> bool:
         """Whether nothing drives the rig: what it does goes on from how it begins. A part is moved by its bench."""
         return not (self.moves_part or np.ptp(self.elevation_m, axis=0).any()

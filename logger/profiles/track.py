@@ -78,7 +78,10 @@ class Way:
 
 
 class WheelTracks(Protocol):
-    """What moves the wheels of cars: a road that they drive along, or a rig that they stand on."""
+    """What moves the wheels of cars: a road that they drive along, or a rig that they stand on, driven by time."""
+
+    @property
+    def timed(self) -> bool: ...
 
     def under_wheels(self, way: Way, stance: Stance) -> tuple[Array, Array]:
         """Elevations (M, w) under the wheels on a way, and their means (M - 1, w) over each step [m]."""
