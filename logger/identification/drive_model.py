@@ -195,6 +195,7 @@ class _TrackWithObstacles:
 
     track: Track
     obstacles: tuple[Obstacle, ...]
+    timed = False
     acts_on = ()
 
     def as_it_is(self, surface: Alterations, actuators: Alterations) -> _TrackWithObstacles:
