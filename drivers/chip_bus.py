@@ -169,8 +169,7 @@ class ConfiguredChip:
     registers_to_check   so many ``check_next`` see every setting once
     """
 
-    def __init__(self, name: str, bus: I2cBus,
-                 settings: Sequence[tuple[Register, Mapping[str, int]]]) -> None:
+    def __init__(self, name: str, bus: I2cBus, settings: Sequence[tuple[Register, Mapping[str, int]]]) -> None:
         self.name = name
         self.registers_to_check = len(settings)
         self._bus = bus

@@ -66,8 +66,7 @@ def cell(text: str) -> str:
 
 def in_plain_signs(error: UnicodeError) -> tuple[str, int]:
     """What is written where an encoding lacks a character (a handler of ``codecs.register_error``): ``+-`` for ``±``;
-    of what has no plain sign the number, ``\\u20ac``.
-    """
+    of what has no plain sign the number, ``\\u20ac``."""
     if not isinstance(error, UnicodeEncodeError):
         raise error
     lacking = error.object[error.start : error.end]

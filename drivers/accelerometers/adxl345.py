@@ -48,8 +48,7 @@ DEVICE_ID = Register("device id", 0x00, reset_value=0xE5)
 OFFSETS = tuple(Register(f"offset {axis}", address, 0x00, {"offset": (7, 0)})
                 for axis, address in (("X", 0x1E), ("Y", 0x1F), ("Z", 0x20)))
 RATE = Register("rate", 0x2C, 0x0A, {"LOW_POWER": (4, 4), "rate code": (3, 0)})
-POWER = Register("power control", 0x2D, 0x00,
-                 {"link, AUTO_SLEEP": (5, 4), "measure": (3, 3), "sleep, wakeup": (2, 0)})
+POWER = Register("power control", 0x2D, 0x00, {"link, AUTO_SLEEP": (5, 4), "measure": (3, 3), "sleep, wakeup": (2, 0)})
 INTERRUPTS = Register("interrupt source", 0x30, 0x00, {"overrun": (0, 0)})
 FORMAT = Register("data format", 0x31, 0x00,
                   {"SELF_TEST": (7, 7), "FULL_RES": (3, 3), "justify": (2, 2), "range": (1, 0)})

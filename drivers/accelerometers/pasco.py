@@ -24,16 +24,7 @@ from drivers.accelerometers.accelerometer import SERIAL_NOISE_MPS2, ReadingQuali
 from drivers.errors import SettingsError
 from drivers.framing import Arrivals, FixedFramer, Frame, LineFramer, exclusive_or, numbers_in
 from drivers.plain_yaml import Node
-from drivers.readings import (
-    BAUDS,
-    STANDARD_GRAVITY_MPS2,
-    AccelerationBlock,
-    Flag,
-    OrNone,
-    RecordedWords,
-    Special,
-    Text,
-)
+from drivers.readings import BAUDS, STANDARD_GRAVITY_MPS2, AccelerationBlock, Flag, OrNone, RecordedWords, Special, Text
 from drivers.sample_clock import DatedSamples, UndatedSamples
 from drivers.wire_contents import SENSOR, RecentBytes
 from drivers.wire_profiles import (

@@ -158,8 +158,7 @@ class EstimateQuestion(LongQuestion):
             beside = {path for path in taken if path.parent == folder} | {*(
                 folder.iterdir() if folder.is_dir() else ())}
             if clash := [path for path in beside if part.fullmatch(path.name) and path.resolve() in taken]:
-                raise BadInput(f"--profile-out {profile}: expected another name: its parts could overwrite "
-                               f"{clash[0]}")
+                raise BadInput(f"--profile-out {profile}: expected another name: its parts could overwrite {clash[0]}")
 
 
 @dataclass(frozen=True)
@@ -465,9 +464,7 @@ class RandomRoadQuestion(Question):
         choices="ABCDEFGH", flag="--class")] = None
     gd_n0_cm3: Annotated[float | None, InPython(
         "degree of roughness Gd(n0), n0 = 0.1 cycles per metre [cm3]", ROUGHNESS)] = None
-    iri_m_per_km: Annotated[float | None, Option(
-        "IRI; Gd(n0) follows from Eq 4.40", IRI_RANGE,
-        "M_PER_KM")] = None
+    iri_m_per_km: Annotated[float | None, Option("IRI; Gd(n0) follows from Eq 4.40", IRI_RANGE, "M_PER_KM")] = None
     length_m: Annotated[float, Option("length of the road [m]", LENGTH, "M")] = 1000.0
     spacing_m: Annotated[float, InPython("between samples [m]", SPACING)] = 0.05
     seed: Annotated[int, Option("seed of the random road (default: 1)", Range(0, float("inf")), "N")] = 1

@@ -212,8 +212,7 @@ def _make_room(folders: list[Path], source: Path, out: Path) -> None:
                if not one.parent.is_symlink() and read_run_facts(one.parent).source == source.name]
     for folder in folders:
         if folder.is_symlink():
-            raise BadInput(f"{folder}: expected a folder for a run of {source}, found a symbolic link: remove "
-                           "the link")
+            raise BadInput(f"{folder}: expected a folder for a run of {source}, found a symbolic link: remove the link")
         if folder not in earlier and folder.exists() and (not folder.is_dir() or any(folder.iterdir())):
             raise BadInput(f"{folder}: expected an empty folder for a run of {source}, found a run of another "
                            "recording")

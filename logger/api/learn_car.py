@@ -400,8 +400,7 @@ def _answer(question: LearnCarQuestion, used: Sequence[_Used], problem: UnknownC
                  for x, covariance in ((car.x, car.covariance), (knowledge.mean, knowledge.covariance)))
     mass = USUAL_MASS_KG if question.mass_kg is None else _sprung_side_kg(question.mass_kg, car.x)
     vehicle = knowledge.car(car.x, mass, "learned-car")
-    model = Model(vehicle, errors=number_errors(
-        lambda x: knowledge.car(x, mass, ""), car.x, car.covariance))
+    model = Model(vehicle, errors=number_errors(lambda x: knowledge.car(x, mass, ""), car.x, car.covariance))
     shown = [*NUMBERS, "wheelbase_m"]
     values = {name: _shown(name, float(car.x[at])) for at, name in enumerate(shown)}
     deviations = {name: _slope(name, values[name]) * float(car.std[at]) for at, name in enumerate(shown)}

@@ -164,8 +164,7 @@ def _check_stands(given: record_checks.ChannelRecord | Path | str, question: Mod
             "analysed with `method` era")
 
 
-def _asked(given: record_checks.ChannelRecord | Path | str, question: ModesQuestion
-           ) -> tuple[Channels, Array | None]:
+def _asked(given: record_checks.ChannelRecord | Path | str, question: ModesQuestion) -> tuple[Channels, Array | None]:
     """The sensors' record, cut to the wished stretch, and the input's samples (n, 1) or None."""
     pushed, name = question.input_column, name_of(given)
     at = name if isinstance(given, record_checks.ChannelRecord) else f"{name}:1"
@@ -182,8 +181,7 @@ def _asked(given: record_checks.ChannelRecord | Path | str, question: ModesQuest
     inside = (t_s >= (t_s[0] if question.from_s is None else question.from_s)) & (
         t_s <= (t_s[-1] if question.to_s is None else question.to_s))
     if not inside.any():
-        raise question.complaint(f"{name}: expected `from_s` before `to_s`, within {t_s[0]:g} "
-                       f"to {t_s[-1]:g} s")
+        raise question.complaint(f"{name}: expected `from_s` before `to_s`, within {t_s[0]:g} to {t_s[-1]:g} s")
     samples = record.samples[inside]
     outputs = [place for place, one in enumerate(record.names) if one != pushed]
     if not outputs:
@@ -214,8 +212,7 @@ def _find(question: ModesQuestion, record: Channels, inputs: Array | None) -> tu
                          "finds its modes; `from_s` and `to_s` cut out a decay")
     if method == "decrement":
         if len(record.names) > 1:
-            raise ValueError(f"expected one column for the decrement (`columns`), found "
-                             f"{','.join(record.names)}")
+            raise ValueError(f"expected one column for the decrement (`columns`), found {','.join(record.names)}")
         return decrement_mode(record.samples[:, 0], record.rate_hz), method
     found = find_modes(record.samples, record.rate_hz, inputs, decay)
     return found, "era" if decay else "ssi" if inputs is None else "n4sid"
@@ -241,8 +238,7 @@ def modes_of_drive(given: ChannelRecord | Path | str, question: ModesQuestion) -
     first_s = time_s[0] + SKIP_S if question.from_s is None else question.from_s
     inside = (time_s >= first_s) & (time_s <= (time_s[-1] if question.to_s is None else question.to_s))
     if not inside.any():
-        raise question.complaint(f"{name}: expected `from_s` before `to_s`, within "
-                       f"{time_s[0]:g} to {time_s[-1]:g} s")
+        raise question.complaint(f"{name}: expected `from_s` before `to_s`, within {time_s[0]:g} to {time_s[-1]:g} s")
     if not np.ptp(samples[inside]) > 0:
         raise BadInput(f"{name}: expected an acceleration that varies, found {samples[inside][0]:g} m/s2 throughout")
     try:

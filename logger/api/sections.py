@@ -174,8 +174,7 @@ def route_sections(files: Sequence[LoggedFile], route: RoadNetwork, first_m: flo
             if not records:
                 continue
             found = on_route(route, trace_of(records))
-            breaks = np.flatnonzero((np.diff(found.direction) != 0)
-                                    | ~(np.abs(np.diff(found.measure_m)) < _GAP_M)) + 1
+            breaks = np.flatnonzero((np.diff(found.direction) != 0) | ~(np.abs(np.diff(found.measure_m)) < _GAP_M)) + 1
             for part in np.split(np.arange(len(records)), breaks):
                 if found.direction[part[0]]:
                     yield from _of_pass(file.name, number, [records[row] for row in part], found.measure_m[part],
@@ -199,8 +198,7 @@ def _of_pass(log: str, number: int, records: Sequence[WindowRecord], measure_m: 
         return
     windows = windows.of(np.flatnonzero(kept))
     first = int(np.floor((windows.start_m[0] - first_m) / length_m))
-    edges_m = first_m + length_m * first + even_edges(
-        float(windows.end_m[-1] - first_m - length_m * first), length_m)
+    edges_m = first_m + length_m * first + even_edges(float(windows.end_m[-1] - first_m - length_m * first), length_m)
     found = in_sections(windows, edges_m)
     counted_records = tuple(one for one, here in zip(records, kept.tolist(), strict=True) if here)
     yield DriveSections(log, number, counted_records, measure_m[kept], found, in_sections(windows, edges_m[[0, -1]]),

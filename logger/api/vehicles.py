@@ -208,8 +208,7 @@ def check_forces(vehicle: Vehicle, track: Track | Excitation, said: str) -> None
             raise BadInput(f"{said}: {one.name}: {error}") from None
 
 
-def car_on(vehicle: Vehicle, effects: Sequence[Chosen], said: Mapping[str, str],
-           track: Track | Excitation) -> Car:
+def car_on(vehicle: Vehicle, effects: Sequence[Chosen], said: Mapping[str, str], track: Track | Excitation) -> Car:
     """The vehicle with its effects, which are possible on this road; ``said`` where, by name. BadInput for one that is
     not, ValueError as ``compose``."""
     for one in effects:

@@ -146,9 +146,8 @@ class RunningRms:
     Its largest value over a stretch is the MTVV of that stretch (Eq 2.11). Before the first sample there is taken
     to have been no vibration, so the value grows during the first ``tau_s``.
 
-    Time is cut into blocks of one window. A window is then the end of the block before and the beginning of this
-    one, each summed from scratch: nothing is ever subtracted, so nothing drifts, and no split of the stream changes
-    a bit.
+    Time is cut into blocks of one window. A window is then the end of the block before and the beginning of this one,
+    each summed from scratch: nothing is ever subtracted, so nothing drifts, and no split of the stream changes a bit.
     """
 
     def __init__(self, rate_hz: float, tau_s: float = 1.0) -> None:

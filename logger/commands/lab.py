@@ -51,8 +51,7 @@ def walk(given: Bench, out: Path, ask: Ask, notify: Say, explain: Explain | None
     from logger.api.lab import loop
 
     loop.make_ready(given, out, "--out")
-    return loop.walk(given, out, ask, notify, progress, explain or (lambda *_: ""),
-                         learns or loop.always)
+    return loop.walk(given, out, ask, notify, progress, explain or (lambda *_: ""), learns or loop.always)
 
 
 # --- at the terminal ---

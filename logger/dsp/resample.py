@@ -224,12 +224,11 @@ def decimation_taps(factor: int) -> Array:
 class Decimator:
     """A grid of ``factor`` x 100 Hz in, a grid of 100 Hz out, without delay in its times.
 
-    The filter is symmetric, and an output is given the time of its middle; it comes half a filter later (85 ms).
-    A run is taken to have stood at its first value before it began and to stay at its last after it ended, so
-    the slow run covers the same stretch. An output is clipped when one of the ``factor`` inputs about it is, and
-    bridged when half of them are: one reading that came late is no hole. Factor 1 passes everything through. The
-    readings themselves are given along.
-    Raises ValueError for a factor below 1.
+    The filter is symmetric, and an output is given the time of its middle; it comes half a filter later (85 ms). A run
+    is taken to have stood at its first value before it began and to stay at its last after it ended, so the slow run
+    covers the same stretch. An output is clipped when one of the ``factor`` inputs about it is, and bridged when half
+    of them are: one reading that came late is no hole. Factor 1 passes everything through. The readings themselves are
+    given along. Raises ValueError for a factor below 1.
 
     The work is laid out like that of ``logger.dsp.filters``: one matrix for a fixed block, zeros for what has
     not arrived, so that no split of the input changes a bit.

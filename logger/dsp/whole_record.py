@@ -8,9 +8,8 @@ by ``resample.Decimator``), so that white noise stays white up to there.
 
 A record without what lies outside of a band of frequencies, and without delay.
 
-A filter of linear phase whose delay is taken out: a sinc in a Kaiser window. Its gain is one half at an
-end of the band and is 60 dB down a hertz beyond it, so that what is compared inside is hardly touched by what is
-outside.
+A filter of linear phase whose delay is taken out: a sinc in a Kaiser window. Its gain is one half at an end of the band
+and is 60 dB down a hertz beyond it, so that what is compared inside is hardly touched by what is outside.
 
 Samples at uneven times, laid on an even grid through an anti-alias filter.
 

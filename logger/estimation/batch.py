@@ -84,9 +84,7 @@ class Windows:
     flags: tuple[frozenset[str], ...]
 
 
-def on_grid(
-    sensor: Sensor, rate_hz: float, accel_mps2: Array, distance_m: Array
-) -> tuple[Sensor, Array, Array]:
+def on_grid(sensor: Sensor, rate_hz: float, accel_mps2: Array, distance_m: Array) -> tuple[Sensor, Array, Array]:
     """Sensor, readings and distances, as recorded at some rate, on the grid of 100 Hz; arrays (n,) in, (t,) out.
 
     What a change of rate leaves of noise and steps is one noise with the same power per hertz. A recorder slower than
@@ -218,9 +216,7 @@ def local_level(iri_m_per_km: Array, window_m: float) -> Array:
     """Mean IRI (n,) of the known ones within ``LEVEL_REACH_M`` of each window; NaN where there is none."""
     reach = round(LEVEL_REACH_M / window_m)
     known = np.isfinite(iri_m_per_km)
-    sums, counts = (
-        np.concatenate([[0.0], np.cumsum(row)]) for row in (np.where(known, iri_m_per_km, 0.0), known)
-    )
+    sums, counts = (np.concatenate([[0.0], np.cumsum(row)]) for row in (np.where(known, iri_m_per_km, 0.0), known))
     place = np.arange(len(iri_m_per_km))
     low, high = np.maximum(place - reach, 0), np.minimum(place + reach + 1, len(iri_m_per_km))
     count = counts[high] - counts[low]

@@ -89,9 +89,7 @@ class ErrorBound:
         exact = self._window_variance(covariance / variance)
         best = self._window_variance(covariance_resolved / variance)
         mean = sqrt(2 / pi * variance)
-        return Limit(
-            PER_KM * mean, PER_KM * mean * sqrt(exact), PER_KM * mean * sqrt(max(exact - best, 0.0))
-        )
+        return Limit(PER_KM * mean, PER_KM * mean * sqrt(exact), PER_KM * mean * sqrt(max(exact - best, 0.0)))
 
     def _gain_power(self, car: LinearCar, speed_mps: float) -> Array:
         """Squared gain from road to reading, delays and contact patch included [1/s4]."""

@@ -18,10 +18,9 @@ by repeated weighting). All but d is linear, so a block is
     A(d) = X' P X,  b(d) = X' P z        X(d): rows I(t_k - d); P: inverse covariance of B + e, without the line [2]
 
 at each delay of a grid, and blocks and drives add up: memory is bounded. For a delay the best w stands upright to
-gravity, and leaves the misfit J(d) = c - b' A^-1 b: its lowest point is the delay, its curvature gives the error.
-The noise is not as assumed, so the error is also taken from what happens when a share of the blocks is left out
-(jackknife [3]); the larger one counts. The strengths of B and e are chosen out of ``STRENGTHS`` by likelihood, as
-blocks come.
+gravity, and leaves the misfit J(d) = c - b' A^-1 b: its lowest point is the delay, its curvature gives the error. The
+noise is not as assumed, so the error is also taken from what happens when a share of the blocks is left out (jackknife
+[3]); the larger one counts. The strengths of B and e are chosen out of ``STRENGTHS`` by likelihood, as blocks come.
 
 What is learned is the delay of the *speed* against the accelerometer as it is read, with the low-pass of its chip: what
 puts both on one clock. ``FLOOR_S`` is for what no fit shows: the car's body pitches late when it brakes, and the sensor
@@ -309,8 +308,7 @@ def _whitened(t_s: Array, strengths: Sequence[Strength], weight: Array, columns:
     return white, root + line
 
 
-def _sums(x: Array, z: Array, t_s: Array, strength: Strength, weight: Array
-          ) -> tuple[Array, Array, float]:
+def _sums(x: Array, z: Array, t_s: Array, strength: Strength, weight: Array) -> tuple[Array, Array, float]:
     """A (d, 3, 3), b (d, 3) and c of a block."""
     d, k, _ = x.shape
     (white,), _ = _whitened(t_s, [strength], weight, np.column_stack([z, x.transpose(1, 0, 2).reshape(k, d * 3)]))

@@ -216,8 +216,7 @@ _STEPS = 4096
 @dataclass(frozen=True, eq=False)
 class History:
     """Means of quarters of a year since 1970, rows by road: its place in the table of segments, quarter, IRI [m/km],
-    passes.
-    """
+    passes."""
 
     segment: npt.NDArray[np.intp]
     quarter: Codes

@@ -25,14 +25,7 @@ from logger.arrays import Array
 from logger.dsp.filters import DecimatingLowPass
 from logger.fitting.information_matrix import inverse_with_prior
 from logger.fitting.levenberg_marquardt import Minimum, minimise
-from logger.identification.identifiability import (
-    Finding,
-    NotIdentifiable,
-    beside,
-    statistical,
-    structural,
-    unexplained,
-)
+from logger.identification.identifiability import Finding, NotIdentifiable, beside, statistical, structural, unexplained
 from logger.identification.noise_models import (
     LEAST_SHARE,
     LEAST_SHARE_SIMULATED,

@@ -423,8 +423,7 @@ class _Step:
         eliminated = _solved(moments, coupling)
         # what is lost by eliminating: half the logarithm of the observed information's determinant
         observed = weight * share**2 * ratio
-        first = _solved(_moments(observed, slope, _PRECISION),
-                        np.stack([np.ones_like(slope), slope], axis=1))
+        first = _solved(_moments(observed, slope, _PRECISION), np.stack([np.ones_like(slope), slope], axis=1))
         leverage = first[:, 0] + slope * first[:, 1]
         lost = -0.5 * leverage * observed
         by_road, by_noise = lost * (2 - 3 * share), lost * -3 * (1 - share)
@@ -450,8 +449,7 @@ class _Step:
     @cached_property
     def _of_drives(self) -> tuple[Array, Array]:
         """Information and score of the waviness of each drive (t,)."""
-        return (self._outer[:, 0, 0] + WAVINESS_APART**-2,
-                self._score[:, 0] - self._roads.drive * WAVINESS_APART**-2)
+        return (self._outer[:, 0, 0] + WAVINESS_APART**-2, self._score[:, 0] - self._roads.drive * WAVINESS_APART**-2)
 
     @cached_property
     def system(self) -> tuple[Array, Array]:

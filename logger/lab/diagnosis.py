@@ -2,10 +2,9 @@
 
 Problem: a name alone is no answer. The reader wants to know how much an effect explains, how certain that is, what else
 it could be, and what these runs could not have shown anyway. Solution: a search by evidence (``selection.stepwise``)
-names the effects; the model with them is fitted finely, and its residual is compared with the noise that the sensor
-has where no car moves it. A residual above that is unexplained, and so is one that takes numbers of the car in conflict
-with their priors. Noise that has a colour is distinguished from physics by what it does not
-depend on.
+names the effects; the model with them is fitted finely, and its residual is compared with the noise that the sensor has
+where no car moves it. A residual above that is unexplained, and so is one that takes numbers of the car in conflict
+with their priors. Noise that has a colour is distinguished from physics by what it does not depend on.
 """
 
 from __future__ import annotations

@@ -538,8 +538,7 @@ def _fit_chord(there: Sequence[LinearisedDrives], slopes: Sequence[LinearisedDri
                changes: Sequence[Sequence[Array]], precision: Array, now: _Refit) -> tuple[_Refit, bool]:
     """The best of some steps with the same derivatives, and whether these hold."""
     models, start = [one.linear for one in slopes], there[0].linear.state.logs
-    information = np.diag(precision) + sum(
-        one.information() - np.diag(one.prior.precision) for one in models)
+    information = np.diag(precision) + sum(one.information() - np.diag(one.prior.precision) for one in models)
     best, predicted = now, np.inf
     for _ in range(_MOST_STEPS):
         squares, gradient = _squares(models, now, precision, start)

@@ -43,8 +43,7 @@ class ReadingsFit:
     moved_m: float = 0.0
 
 
-def fit_to_readings(model_of: ModelOf, records: list[Run], options: Callable[[DriveModel], FitOptions]
-                    ) -> ReadingsFit:
+def fit_to_readings(model_of: ModelOf, records: list[Run], options: Callable[[DriveModel], FitOptions]) -> ReadingsFit:
     """The fit of a model to records (``session.upright_fit``), with quantised readings and uncertain places.
 
     NotIdentifiable and ValueError as ``upright_fit``.

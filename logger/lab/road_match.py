@@ -107,8 +107,7 @@ def match_below_bounce(run: Run, prediction: Array, body_hz: Array) -> RoadMatch
     return road_match(run, prediction, band_hz, most_lag_s=0.25 / band_hz[1])
 
 
-def road_match(run: Run, prediction: Array, band_hz: tuple[float, float], most_lag_s: float = _MOST_LAG_S
-               ) -> RoadMatch:
+def road_match(run: Run, prediction: Array, band_hz: tuple[float, float], most_lag_s: float = _MOST_LAG_S) -> RoadMatch:
     """Correlation of a run with a prediction (n,) between two frequencies [Hz]: of all of it, or where its distance
     error grows along the way, of its parts, each at a lag of its own: ten bounces of a body, 8 s, in which a speed that
     is off by 0.1 m/s moves it by no more than a tenth of the wave that bounces it at 6 m/s."""

@@ -266,8 +266,7 @@ def _modes(vehicle: Vehicle) -> Array:
     return np.array([(one.frequency_hz, one.damping_ratio) for one in vibrating(modes_of(structure_of(vehicle)))])
 
 
-def car_modes(vehicle: Vehicle, samples: Array, speed_mps: Array, usable: Bools, rate_hz: float
-              ) -> ModalResult:
+def car_modes(vehicle: Vehicle, samples: Array, speed_mps: Array, usable: Bools, rate_hz: float) -> ModalResult:
     """The modes of a vehicle near this one, out of its reading (n,) on roads that nobody measured.
 
     speed_mps    (n,) at each sample; ``usable`` (n,) whether it is a reading

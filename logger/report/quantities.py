@@ -1,6 +1,5 @@
 """Numbers with their errors, as a person reads them, in SI or in the units of road agencies in the US; paragraphs and
-columns of plain text, as wide as a screen.
-"""
+columns of plain text, as wide as a screen."""
 
 from __future__ import annotations
 

@@ -1,6 +1,5 @@
 """Stretches of a drive that are not believed: a sensor that stands still or repeats itself, a wrong speed; and what
-readings and fixes are judged by as they come.
-"""
+readings and fixes are judged by as they come."""
 
 from __future__ import annotations
 

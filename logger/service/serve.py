@@ -1,6 +1,5 @@
 """The live service put together (devices, threads, log, status and watchdog), and what it reports of itself: a snapshot
-for the status file, a line for systemd.
-"""
+for the status file, a line for systemd."""
 
 from __future__ import annotations
 

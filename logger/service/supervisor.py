@@ -29,10 +29,9 @@ class Supervisor:
     """One source and its state: ``absent`` (never seen), ``ok``, ``silent`` (open, says nothing) or ``retrying``.
 
     A single failed read (a NACK, a time-out) costs one sample and the device is asked again at the next poll; after
-    some in a row, and a third of a second of nothing else, it is closed and restarted. Starting takes many
-    transfers, and on a bus that refuses every third one it is better not to have to. A device that has lost its
-    settings is restarted at once; one that loses them again before it has given a reading is waited for as after
-    any other fault.
+    some in a row, and a third of a second of nothing else, it is closed and restarted. Starting takes many transfers,
+    and on a bus that refuses every third one it is better not to have to. A device that has lost its settings is
+    restarted at once; one that loses them again before it has given a reading is waited for as after any other fault.
 
     restarts, faults, settings_lost     how often each happened
     """

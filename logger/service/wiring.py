@@ -287,9 +287,8 @@ def dump_header(config: Config, receiver: CarriedDelay | None = None, noise: Kno
 
 
 def config_for_dump(header: DumpHeader, given: Config | None, vehicle: str | None, place: str = "header") -> Config:
-    """Settings for a replay. What is in the bytes (driver, range, oversampling, baud rate) is always the
-    recording's; the rest is that of the settings ``given``, or without them the defaults with what the recording's
-    header says.
+    """Settings for a replay. What is in the bytes (driver, range, oversampling, baud rate) is always the recording's;
+    the rest is that of the settings ``given``, or without them the defaults with what the recording's header says.
 
     Raises BadInput, beginning with ``place``, where the recording says what cannot be or names what is not known here.
     """

@@ -1,11 +1,10 @@
 """Is what lies on the disk what was written? Checks of segment logs and recorded dumps.
 
 Problem. A card or a copy may have damaged a file anywhere, or cut it; a file may be open while it is looked at.
-Solution. Every record is read the way every other reader reads it. A row that does not fit its check value is
-corrupt, a last one without its end is torn. Rows that are missing show as a gap: segment numbers count up by one
-through a session, from file to file, and times never go back. The sidecar of a finished log says how many rows it
-had, so that a file cut neatly between two rows shows too. A part, of a log or of a recording, that ends in a torn row
-is simply open.
+Solution. Every record is read the way every other reader reads it. A row that does not fit its check value is corrupt,
+a last one without its end is torn. Rows that are missing show as a gap: segment numbers count up by one through a
+session, from file to file, and times never go back. The sidecar of a finished log says how many rows it had, so that a
+file cut neatly between two rows shows too. A part, of a log or of a recording, that ends in a torn row is simply open.
 A stick that logs were exported to is compared with the manifest that lies beside them, and has to have one.
 """
 

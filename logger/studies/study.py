@@ -1,10 +1,9 @@
 """What a study is: a table or a figure that was printed, made again and set beside what is printed there.
 
-Every file of a shelf's folder offers some as ``STUDIES``. A study holds the printed values, so that this program's
-are never seen without them, and says of each in a word and a sentence how they agree, and why where they do
-not. The word that it states has to come out of its checks (``Value``, ``Statement``). The records that the
-dissertation measured were never published: where it measured, a study simulates under the conditions that the text
-gives, and says so.
+Every file of a shelf's folder offers some as ``STUDIES``. A study holds the printed values, so that this program's are
+never seen without them, and says of each in a word and a sentence how they agree, and why where they do not. The word
+that it states has to come out of its checks (``Value``, ``Statement``). The records that the dissertation measured were
+never published: where it measured, a study simulates under the conditions that the text gives, and says so.
 
 A ``Value`` is a printed number, a ``Statement`` what is printed in words beside the figure of ours that it is about.
 The word of a printed item is computed from its checks: a misprint first, then what cannot be reproduced, then what is

@@ -304,8 +304,7 @@ def in_blocks(structure: Structure, passage: Passage, observe: Array) -> Array:
     if structure.on_base:  # that of a rig which a force drives is at rest
         moves = driving.any(axis=0) & gain.any(axis=0)
         driving, gain = driving[:, moves], gain[:, moves]
-    return driven_outputs(transition, gain, observe, driving,
-                          begun(structure.at_rest(inputs[0]), passage.begins))
+    return driven_outputs(transition, gain, observe, driving, begun(structure.at_rest(inputs[0]), passage.begins))
 
 
 @lru_cache(maxsize=16)

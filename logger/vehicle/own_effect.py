@@ -209,8 +209,7 @@ def _check_motion(law: MotionLaw) -> None:
         raise ValueError(f"expected with_law to get one of {', '.join(map(str, Between))}, found {law.between!r}")
     functions_of(law)
     memory = law.memory
-    if not (isinstance(memory, tuple) and len(memory) <= MOST_MEMORY
-            and all(_is_number(one) for one in memory)):
+    if not (isinstance(memory, tuple) and len(memory) <= MOST_MEMORY and all(_is_number(one) for one in memory)):
         raise ValueError(f"expected memory to be a tuple of at most {MOST_MEMORY} finite numbers, found {memory!r}")
     if (law.rates is None) == bool(memory):
         raise ValueError("expected rates and memory both, or neither: how fast each state grows, and where it is at "

@@ -143,8 +143,7 @@ def _code(_context: Any, address: Any, given: Any, first: Any, felt: Any, answer
         def data(index: int) -> Any:
             return context.make_array(signature.args[index])(context, builder, arguments[index]).data
 
-        builder.call(builder.inttoptr(arguments[0], function),
-                     [builder.gep(data(1), [arguments[2]]), data(3), data(4)])
+        builder.call(builder.inttoptr(arguments[0], function), [builder.gep(data(1), [arguments[2]]), data(3), data(4)])
         return context.get_dummy_value()
 
     return numba.types.void(numba.types.intp, given, numba.types.intp, felt, answers), code

@@ -75,19 +75,7 @@ from ..support.drives.measured import (
     varied_drive,
 )
 from .comfort_noise import weighted_by_scipy
-from .estimator import (
-    LEAD_S,
-    PUSH,
-    START_US,
-    TOWN,
-    config_for,
-    known_best,
-    logged_records,
-    on_grid,
-    r2,
-    rav4,
-    reported,
-)
+from .estimator import LEAD_S, PUSH, START_US, TOWN, config_for, known_best, logged_records, on_grid, r2, rav4, reported
 from .rounding_limit import CELL_M, NONE, Changes, Lap, best_values
 
 Array = np.ndarray

@@ -33,15 +33,7 @@ from logger.estimation.sensor_noise import NoiseBelief
 from logger.roads.iri import TIRE_BASE_M, golden_car_sections
 from logger.vehicle.vehicle import Vehicle
 
-from ..support.drives.measured import (
-    GRID_HZ,
-    SPACING_M,
-    Accelerometer,
-    Drive,
-    Road,
-    recorder_response,
-    road_response,
-)
+from ..support.drives.measured import GRID_HZ, SPACING_M, Accelerometer, Drive, Road, recorder_response, road_response
 from .estimator import LEAD_S
 
 Array = np.ndarray

@@ -8,15 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.lab.diagnosis import (
-    ALREADY_PRESENT,
-    LAID_BY_THE_ROAD,
-    LabDiagnosis,
-    assess,
-    diagnose,
-    obstacles_of,
-    refit,
-)
+from logger.lab.diagnosis import ALREADY_PRESENT, LAID_BY_THE_ROAD, LabDiagnosis, assess, diagnose, obstacles_of, refit
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.selection.evidence import FALSE_ALARM, probability_by_chance

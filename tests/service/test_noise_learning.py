@@ -16,14 +16,7 @@ from logger.estimation.receiver_delay import UNKNOWN
 from logger.estimation.sensor_noise import NoiseBelief
 from logger.service import wiring
 from logger.service.config import AUTO, AccelerometerConfig, Config, load_config
-from logger.service.learning import (
-    DELAY,
-    NOISE,
-    KnownNoise,
-    NoiseLearning,
-    noise_at_start,
-    read_noise,
-)
+from logger.service.learning import DELAY, NOISE, KnownNoise, NoiseLearning, noise_at_start, read_noise
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_model
 

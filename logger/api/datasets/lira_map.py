@@ -56,8 +56,7 @@ class ProfilerPass:
 
 def run(folder: Path, effort: Workload) -> Result:
     """As ``from_folder`` calls it."""
-    passes = [ProfilerPass(expected_files(folder, f"{name}.json*", "a pass of the profiler")[0])
-              for name in PASSES]
+    passes = [ProfilerPass(expected_files(folder, f"{name}.json*", "a pass of the profiler")[0]) for name in PASSES]
     pairs = list(effort.each(list(combinations(passes, 2))))
     tables: list[Table] = []
     ours: list[list[float]] = []

@@ -30,13 +30,7 @@ from logger.identification.drive_model import DriveModel
 from logger.identification.identifiability import NotIdentifiable
 from logger.identification.noise_models import UNTESTED, Test, autocorrelation, autocorrelations, cross_correlation
 from logger.identification.prediction_error_fit import Fit, FitOptions, least_share
-from logger.identification.session import (
-    LEAST_SAMPLES,
-    drives_of,
-    error_before,
-    fit_options,
-    obstacle_starts,
-)
+from logger.identification.session import LEAST_SAMPLES, drives_of, error_before, fit_options, obstacle_starts
 from logger.identification.shared_road_covariance import CommonRoughness, may_have_common, with_common_roughness
 from logger.identification.unknown_inputs import (
     EACH,

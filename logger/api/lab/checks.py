@@ -206,8 +206,7 @@ def _moves(run: Run, prediction: Array) -> bool:
 def _other_ways_up(followed: _Followed, rig: LikeliestRig | None) -> Iterator[str]:
     """Which runs are upside down: none that a rig that the file allows goes along with. (Where nothing moved it
     below the bounce of a file that does not know its spring, a few waves of noise correlate with any sign.)"""
-    upright: Iterable[bool] = (
-        [False] * len(followed.pairs) if rig is None else rig.goes_along[: len(followed.pairs)])
+    upright: Iterable[bool] = [False] * len(followed.pairs) if rig is None else rig.goes_along[: len(followed.pairs)]
     for (run, _), around, below, known in zip(followed.pairs, followed.around, followed.below_at_hand, upright,
                                               strict=True):
         if not known and (below.is_upside_down or (around.is_upside_down and below.turned > below.correlation)):

@@ -129,8 +129,7 @@ def diagnose(question: DiagnoseQuestion) -> Diagnosis:
     return diagnosis_of(found, bench, None if question.list_all else SHOWN_ROWS, _next(question, bench, found))
 
 
-def diagnosis_of(found: LabDiagnosis, bench: Bench, most: int | None = None, next_command: str = ""
-                 ) -> Diagnosis:
+def diagnosis_of(found: LabDiagnosis, bench: Bench, most: int | None = None, next_command: str = "") -> Diagnosis:
     """What the lab found on a bench, as it is shown; ``most`` so many candidates, None: all."""
     left_out = runs_left_out(bench.runs.runs)
     content = Blocks([*diagnosis_blocks(found, most), *map(Hint, [_compared(bench), *left_out_lines(left_out)])])
@@ -190,8 +189,7 @@ def _diagnosed_same_road(question: DiagnoseQuestion) -> Diagnosis:
     model = model_of(question.vehicle)
     found = _diagnosed(model, records_of([_drive(one) for one in each(question.runs)]), question)
     most = None if question.list_all else SHOWN_ROWS
-    return _shown(found, Blocks(same_road_blocks(found, names, most)), same_road_json(found),
-                  model.vehicle.name)
+    return _shown(found, Blocks(same_road_blocks(found, names, most)), same_road_json(found), model.vehicle.name)
 
 
 def _drive(given: Run | Path | str) -> tuple[drive_file.Drive, str]:

@@ -214,8 +214,7 @@ def law_blocks(learned: LearnedModel) -> Iterator[Block]:
 def sentences(law: Law, addition: AddedEffects) -> list[str]:
     """The law, what it brings, and what it may be instead: paragraphs."""
     said = words(law, addition)
-    lines = [*removed_words(addition.removed, addition.band), f"Learned: {said}.",
-             _errors(addition)]
+    lines = [*removed_words(addition.removed, addition.band), f"Learned: {said}.", _errors(addition)]
     if law.effects:
         beside = [one for one in addition.new if one.effect.name != law.draft.name]
         lines.append("Also missing: " + "; ".join(f"{one.effect.name} ({numbers_of(one)})" for one in beside)

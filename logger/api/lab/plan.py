@@ -23,15 +23,7 @@ from logger.api.vehicles import model_of
 from logger.chart_data import Array
 from logger.errors import BadInput
 from logger.estimation.sensor_noise import NOISE_MPS2
-from logger.lab.plan import (
-    ISOLABLE_SIGMA,
-    DriveOption,
-    LabNextDrive,
-    LabPlan,
-    PlannedCar,
-    SensorNoise,
-    at_speed,
-)
+from logger.lab.plan import ISOLABLE_SIGMA, DriveOption, LabNextDrive, LabPlan, PlannedCar, SensorNoise, at_speed
 from logger.lab.plan import plan as planned_by_lab
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.profiles.track import Track
@@ -143,8 +135,7 @@ def _longest_road(bench: Bench | None) -> Track | None:
 
 
 _MOST_NEXT = 5
-SENSOR_HINT = ("Assumed noise: a second accelerometer like the first, a travel sensor 0.5 mm, a gyroscope "
-               "0.001 rad/s.")
+SENSOR_HINT = "Assumed noise: a second accelerometer like the first, a travel sensor 0.5 mm, a gyroscope 0.001 rad/s."
 _OBSTACLES = {"bump": "a speed bump {height_m:g} m high and {width_m:g} m long",
               "plate": "a plank {height_m:g} m high and {length_m:g} m long"}
 _SENSES = {"acceleration": "an accelerometer on", "travel": "a travel sensor at", "pitch_rate": "a pitch gyroscope on"}

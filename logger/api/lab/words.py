@@ -1,6 +1,5 @@
 """What the lab's answers share: errors on one scale, what is taken out of an error before anything is judged, which
-frequencies were compared, and what a residual looks like; in sentences, as rows, in pictures and for a program.
-"""
+frequencies were compared, and what a residual looks like; in sentences, as rows, in pictures and for a program."""
 
 from __future__ import annotations
 
@@ -145,8 +144,7 @@ def _said(one: Drift) -> str:
 
 def _alike(one: Drift, other: Drift) -> bool:
     pairs = ((one.size_mps2, other.size_mps2), (one.time_s, other.time_s))
-    return one.form == other.form and all(
-        a is None or b is None or abs(a - b) <= _ALIKE * abs(b) for a, b in pairs)
+    return one.form == other.form and all(a is None or b is None or abs(a - b) <= _ALIKE * abs(b) for a, b in pairs)
 
 
 _ERROR_WORDS = {AS_FILED: "with the vehicle's file unchanged", REFITTED: "with its parameters refitted"}

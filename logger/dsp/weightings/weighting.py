@@ -51,9 +51,8 @@ class Weighting:
     counts_up_to_hz    what lies above is no part of what it stands for (clause 1)
 
     A part whose frequencies are infinite is absent (f3 alone infinite: a transition without zero); one that is there
-    has a quality factor, else ValueError. Source: ISO
-    2631-1:1997 Annex A; Eq 2.13-2.17 of Blum (2015). Eq 2.16 is misprinted there: the denominator of the upward step
-    has f6 and Q6, as here.
+    has a quality factor, else ValueError. Source: ISO 2631-1:1997 Annex A; Eq 2.13-2.17 of Blum (2015). Eq 2.16 is
+    misprinted there: the denominator of the upward step has f6 and Q6, as here.
     """
 
     name: str

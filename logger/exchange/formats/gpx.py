@@ -45,8 +45,7 @@ def _segments(rows: Iterable[Feature], names: tuple[str, ...]) -> Iterator[str]:
         if is_open and not row.joins:
             yield "</trkseg>\n"
         if row.middle is not None:
-            yield ("" if is_open and row.joins else "<trkseg>\n") + _point(
-                "trkpt", row, row.middle, names)
+            yield ("" if is_open and row.joins else "<trkseg>\n") + _point("trkpt", row, row.middle, names)
         is_open = row.middle is not None
     if is_open:
         yield "</trkseg>\n"

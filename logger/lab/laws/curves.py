@@ -46,8 +46,7 @@ class LawMotion:
         return f"{factor * size:g} {unit}"
 
 
-RATE = LawMotion("rate", "rate", "rate_mps", "m/s", (1.0, "m/s"),
-                 "with_damper(lambda rate_mps: force_n(p, rate_mps))")
+RATE = LawMotion("rate", "rate", "rate_mps", "m/s", (1.0, "m/s"), "with_damper(lambda rate_mps: force_n(p, rate_mps))")
 TRAVEL = LawMotion("travel", "travel", "travel_m", "m", (1000.0, "mm"),
                    "with_spring(lambda travel_m: force_n(p, travel_m))")
 DEFLECTION = LawMotion("deflection", "tire's deflection", "deflection_m", "m", (1000.0, "mm"),

@@ -188,8 +188,7 @@ class LawContext:
     @cached_property
     def residuals(self) -> list[Array]:
         """Measured minus predicted acceleration (n,), per run, whole [m/s2]."""
-        return [run.measured_mps2 - run.main(one)
-                for run, one in zip(self.runs, self.state.predictions, strict=True)]
+        return [run.measured_mps2 - run.main(one) for run, one in zip(self.runs, self.state.predictions, strict=True)]
 
     @cached_property
     def responses(self) -> list[Response]:

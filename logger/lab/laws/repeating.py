@@ -234,8 +234,7 @@ def _coherent(signals: list[Array], rate_hz: float, began_s: float, at: Array, c
     return found
 
 
-def _refine(signals: list[Array], rate_hz: float, began_s: float, at: Array, coherent_s: float,
-            wanders: bool) -> Array:
+def _refine(signals: list[Array], rate_hz: float, began_s: float, at: Array, coherent_s: float, wanders: bool) -> Array:
     """The numbers of a tone that maximise that power, by the simplex method."""
     from scipy.optimize import minimize
 

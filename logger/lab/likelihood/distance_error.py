@@ -308,8 +308,7 @@ def record_error(run: Run, tolerance: Tolerance, scale_std: float = 0.0) -> Reco
 def zero_of(errors: Sequence[RecordError], record: Sequence[Array]) -> tuple[float, list[Array]]:
     """The zero of the force [N] that runs of a part on its bench have, in the mean, by numbers (k,) per run, and the
     numbers of records that have it and no other error; 0 and exact records of others."""
-    found = [float(k[-1]) if one.has_zero else 0.0
-             for one, k in zip(errors, record, strict=True)]
+    found = [float(k[-1]) if one.has_zero else 0.0 for one, k in zip(errors, record, strict=True)]
     zero, exact = float(np.mean(found)), [np.zeros(one.count) for one in errors]
     for k in exact:
         k[-1] = zero

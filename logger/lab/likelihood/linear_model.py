@@ -231,8 +231,7 @@ class LinearModel:
         """Derivatives in each run, (n,) or (m, n) to (..., kept)."""
         return whitened(self.posterior, self.whiteners, columns, self._predictions)
 
-    def fit_record_errors(self, predictions: Sequence[Array],
-                          record: Sequence[Array] | None = None) -> RecordErrorFit:
+    def fit_record_errors(self, predictions: Sequence[Array], record: Sequence[Array] | None = None) -> RecordErrorFit:
         """The most likely record errors for predictions (n,) per run that were made with the record errors ``record``
         (k,) per run; None: with the state's."""
         return self.fit_record_errors_to(self.posterior.residuals_of(predictions),
@@ -302,8 +301,7 @@ def whitened(posterior: Posterior, whiteners: Sequence[JointWhitener], columns: 
     return [whitener(one) for whitener, one in zip(whiteners, sensitive, strict=True)]
 
 
-def _coordinate_descent(minus_twice_log_evidence: Callable[[Array], float], here: Array
-                        ) -> tuple[Array, float]:
+def _coordinate_descent(minus_twice_log_evidence: Callable[[Array], float], here: Array) -> tuple[Array, float]:
     """Minimum of a function of logarithms of sizes (3,), coordinate by coordinate, in steps that become smaller."""
     least, step = minus_twice_log_evidence(here), 0.8
     while step > 0.1:

@@ -157,10 +157,9 @@ def excess_by_signal(posterior: Posterior, state: State, chance: float, noise: N
     """Share by which the residual is above what right models leave, by name of the signal (empty: the sensor's
     acceleration), of the run where it is largest. They leave the noise, what the model makes of the noise of its
     measured input, the discrepancy of two right simulations, and what is within the prior of calibrated sensors: as
-    large a share of what was measured as ``sigma`` deviations of the gain of the sensor, and of that which
-    measured a rig's input. (Gains are fitted; how far a sensor is off a straight line, or its cross talk, are of that
-    size at most.) A run so short that noise alone may do the same with this probability counts no higher than
-    ``UNEXPLAINED``.
+    large a share of what was measured as ``sigma`` deviations of the gain of the sensor, and of that which measured a
+    rig's input. (Gains are fitted; how far a sensor is off a straight line, or its cross talk, are of that size at
+    most.) A run so short that noise alone may do the same with this probability counts no higher than ``UNEXPLAINED``.
 
     noise    of the sensors, where it is known; None: estimated from the residuals
     sigma    0: sensors are taken to be right but for their noise

@@ -9,13 +9,12 @@ Solution: the measured spectrum is fitted by a sum of four parts,
     S(f) = B(f) (c M(f) + N) + n,    B(f) = 1 / (1 + x^(2 m)),    x = tan(pi f / rate) / tan(pi cutoff / rate)
 
 M the spectrum that the model predicts, c a gain, N white noise that went through the filter, n white noise that was
-added behind it (no more than the quietest band of the record holds), and B Butterworth's low-pass as it is computed
-on samples (S. Butterworth 1930; A. Oppenheim and R. Schafer, Discrete-Time Signal Processing, 7.2). Spectra know
-neither phases nor places: distances that are off by metres do not matter here. The misfit is the mean absolute
-difference of log S(f), with a filter and with B = 1: an effect that the model lacks bends a spectrum by some dB, here
-up, there down, and no B compensates that; a filter takes away tens of dB, and with the right B the misfit is next to
-nothing. Nor may a sensor on a bracket (``sensor_mount_resonance``) together with a longer contact patch
-(``tire_enveloping``) fit as well.
+added behind it (no more than the quietest band of the record holds), and B Butterworth's low-pass as it is computed on
+samples (S. Butterworth 1930; A. Oppenheim and R. Schafer, Discrete-Time Signal Processing, 7.2). Spectra know neither
+phases nor places: distances that are off by metres do not matter here. The misfit is the mean absolute difference of
+log S(f), with a filter and with B = 1: an effect that the model lacks bends a spectrum by some dB, here up, there down,
+and no B compensates that; a filter takes away tens of dB, and with the right B the misfit is next to nothing. Nor may a
+sensor on a bracket (``sensor_mount_resonance``) together with a longer contact patch (``tire_enveloping``) fit as well.
 
 What is a filter, and what a slow sensor? No part of a car or of a sensor falls faster than with the fourth power of
 the frequency in power (``sensor_bandwidth`` of second order, 12 dB an octave); a rubber mount or a tire's contact

@@ -30,8 +30,7 @@ class ForceByTest(ResidualTest):
     def run(self, tested: ResidualEvidence) -> ResidualTestResult:
         """With the curve, and how the law bends."""
         forces = tested.forces
-        curve, bend = ((forces.by_rate, forces.progression) if self._by_rate else
-                       (forces.by_travel, forces.hardening))
+        curve, bend = ((forces.by_rate, forces.progression) if self._by_rate else (forces.by_travel, forces.hardening))
         known = np.abs(curve.force_n) > 3 * curve.error_n
         return self.result(float(np.abs(curve.force_n[known]).max(initial=0.0)), None, curve.p_value,
                            curve.share > LEAST_SHARE, curve=curve, bend=bend.value)

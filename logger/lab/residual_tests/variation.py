@@ -29,8 +29,7 @@ class ExcitationTest(ResidualTest):
         low, high = parts[0], parts[-1]
         grown = max(high.residual_mps2, 1e-300) / max(low.residual_mps2, 1e-300)
         large = len(parts) > 1 and (grown > LEAST_GROWTH if rho > 0 else grown < 1 / LEAST_GROWTH)
-        return self.result(rho, None, p_value, large, low=low, high=high,
-                           motion_unit=residuals.unit)
+        return self.result(rho, None, p_value, large, low=low, high=high, motion_unit=residuals.unit)
 
     def sentence(self, found: ResidualTestResult) -> str:
         """The residual at small and at large motion."""

@@ -1,5 +1,4 @@
 """What the residuals of a model look like: where their power sits, and tests that know no effect.
 
-Reading order: breakdown, statistics, road_coherence, force_state_map, ``lab.residual_tests``;
-unexplained.
+Reading order: breakdown, statistics, road_coherence, force_state_map, ``lab.residual_tests``; unexplained.
 """

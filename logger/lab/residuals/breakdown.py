@@ -250,8 +250,7 @@ def _parts(values: Array, edges: Array, residual: Array, measured: Array, whole:
                   name) for i in np.flatnonzero(count)]
 
 
-def _part(low: float, high: float, power: float, of: float, whole: float, mean: float, samples: int,
-          name: str) -> Part:
+def _part(low: float, high: float, power: float, of: float, whole: float, mean: float, samples: int, name: str) -> Part:
     """A part by its powers: of its residual, of its measurement, of all residuals, and the mean of the first."""
     return Part(low, high, float(np.sqrt(power / of)) if of > 0 else float("nan"),
                 float(power / whole) if whole > 0 else 0.0, float(np.sqrt(mean)), samples, name)

@@ -151,8 +151,7 @@ def _fit(target: Sequence[Array], others: Sequence[Array], columns: Sequence[Arr
     coefficients = inverse @ (x.T @ y)
     rank, before = int(kept.sum()), float(y @ y)
     after = before - float(coefficients @ product @ coefficients)
-    return (coefficients / scale, inverse / np.outer(scale, scale), rank, len(y) - basis.shape[1] - rank, before,
-            after)
+    return (coefficients / scale, inverse / np.outer(scale, scale), rank, len(y) - basis.shape[1] - rank, before, after)
 
 
 def _curve(regression: _Regression, residuals: ModelResiduals, of_rate: bool) -> Curve:

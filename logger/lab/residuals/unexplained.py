@@ -381,8 +381,7 @@ def coloured_noise(every: Sequence[JointBands], shape: Shape) -> NoiseLevel | No
     return _steady_noise(every, _whole(residuals.residual, every), _whole(residuals.model, every))
 
 
-def _steady_noise(every: Sequence[JointBands], residual: Sequence[Array], model: Sequence[Array]
-                  ) -> NoiseLevel | None:
+def _steady_noise(every: Sequence[JointBands], residual: Sequence[Array], model: Sequence[Array]) -> NoiseLevel | None:
     """The noise of residuals (n,) per run that fall or rise with frequency and surely do not grow with a model's motion
     (n,); None as well where there are several signals, or runs are compared in several bands."""
     bands = [one for run in every for one in run.each]

@@ -322,8 +322,7 @@ def _best_of_screened(base: RoadModel, one: RoadTrial) -> tuple[Chosen, float, H
         (*base.effects, best), base.state.logs))), float("nan"))
 
 
-def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequence[Chosen]
-               ) -> dict[str, str]:
+def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequence[Chosen]) -> dict[str, str]:
     """Effects that cannot be tried, and why."""
     found, nominal = {}, problem.response(present, problem.start_vehicle)
     for name, effect in effects.items():

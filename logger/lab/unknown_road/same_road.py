@@ -26,12 +26,11 @@ spectrum and by the envelope of what was read, so that neither a resonance of th
 lacks much may correlate with nothing: before drives are rejected, the car is tried with each of the effects that it may
 lack. Where one road would not be significant either, the pair is reported as doubtful.
 
-A receiver's speeds put a drive on the road to a tenth of a metre within some seconds and to metres within a
-minute, each drive differently. At the frequency of the wheels' bounce that is a wave of the road, and effects that damp
-it or delay the record imitate the blur. So the record of each drive is compared, window by window, with what the
-others make a model of the car expect there (``lab.likelihood.lag``), and its distances are moved by the lags, again and
-again until these are small. A delay of the record moves with them: of such drives it cannot be distinguished from the
-receiver's.
+A receiver's speeds put a drive on the road to a tenth of a metre within some seconds and to metres within a minute,
+each drive differently. At the frequency of the wheels' bounce that is a wave of the road, and effects that damp it or
+delay the record imitate the blur. So the record of each drive is compared, window by window, with what the others make
+a model of the car expect there (``lab.likelihood.lag``), and its distances are moved by the lags, again and again until
+these are small. A delay of the record moves with them: of such drives it cannot be distinguished from the receiver's.
 """
 
 from __future__ import annotations
@@ -120,8 +119,7 @@ class DriveConditions:
     waviness: float
 
 
-def responses_of(car: Car, rate_hz: float, motions: Sequence[DriveConditions], highest_cpm: float = 4.0
-                 ) -> Complex:
+def responses_of(car: Car, rate_hz: float, motions: Sequence[DriveConditions], highest_cpm: float = 4.0) -> Complex:
     """Readings as ``response_of`` for each of some motions (d, x, f): of the linear car that comes nearest to one that
     is not linear, the same for all of one that is.
 
@@ -307,8 +305,7 @@ class SameRoad:
     def prior_terms(self, logs: Array, free_parameters: int, roads: Array) -> tuple[Array, Array]:
         """Deviations of a state's numbers from the means of their priors (m,), and the prior precisions (m,): of the
         car's, of so many free parameters of effects, which have none, and of the roads': of a stretch's waviness, and
-        of its places from those of the whole way [m] (judgements).
-        """
+        of its places from those of the whole way [m] (judgements)."""
         known = [(self._roads.are(what), off) for what, off in ((WAVINESS, 0.3), (OFFSET, 0.05))]
         off = sum(which * (roads - self._first) for which, _ in known)
         free = np.zeros(free_parameters)
@@ -714,8 +711,7 @@ def placed_by_road(runs: Sequence[Run], vehicle: Vehicle, tolerance: Tolerance, 
     for _ in range(rounds):
         problem = SameRoad(found, vehicle, tolerance, start_vehicle)
         offsets_m = _offsets(problem, present)
-        found = [replace(run, distance_m=run.distance_m + off_m)
-                 for run, off_m in zip(found, offsets_m, strict=True)]
+        found = [replace(run, distance_m=run.distance_m + off_m) for run, off_m in zip(found, offsets_m, strict=True)]
         # A fiftieth of the shortest wave that a car feels: no larger than the errors of lags.
         if np.sqrt(np.mean(np.concatenate(offsets_m[1:]) ** 2)) < 0.01:
             break

@@ -13,11 +13,10 @@ may be full, read-only or worn, may carry other cars' logs, and may hold names t
 Solution. Every logger has a folder of its own on the stick, ``ridelog/<identity>``. A file is written there under a
 temporary name, flushed, read back from the medium against the SHA-256 of what was read from the card, and only then
 given its name. What has the name already, and is not the same, is set aside under another name, never overwritten, and
-stays in the manifest if it was in it.
-Now and then, the more seldom the longer it is, the manifest is replaced in the same way; only what a manifest that was
-read back lists is marked as exported. So at every instant the marks are true, and a second export copies what the first
-one did not. Nothing is written when all is there, so that a stick that is write-protected by then is no fault. What a
-stick holds is never taken into memory as a whole.
+stays in the manifest if it was in it. Now and then, the more seldom the longer it is, the manifest is replaced in the
+same way; only what a manifest that was read back lists is marked as exported. So at every instant the marks are true,
+and a second export copies what the first one did not. Nothing is written when all is there, so that a stick that is
+write-protected by then is no fault. What a stick holds is never taken into memory as a whole.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """Records of many columns: how their samples are judged, and how they are read.
 
-Acceleration records that are not what they seem: recognised, mended where that was asked for, else reported or
-refused.
+Acceleration records that are not what they seem: recognised, mended where that was asked for, else reported or refused.
 
 Problem: repeated samples, values in g, the end of a sensor's range and a recorder's uneven clock all give figures that
 look like any others. Solution: what makes a result wrong is refused, with the option that mends it; what is doubtful

@@ -1,6 +1,5 @@
 """GeoJSON files (RFC 7946): roads as lines, as an extract of OpenStreetMap gives them, and a route: a line with
-measures, as road agencies keep it, or with kilometre posts beside it.
-"""
+measures, as road agencies keep it, or with kilometre posts beside it."""
 
 from __future__ import annotations
 

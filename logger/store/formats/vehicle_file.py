@@ -150,8 +150,7 @@ def check_moves_itself(vehicle: Vehicle) -> None:
 
 def read_on_board(path: Path | str) -> CarModel:
     """Read a vehicle file as ``read_model``, but for effects of a user's own: they are not run but refused (BadInput),
-    and so are parts on a test bench.
-    """
+    and so are parts on a test bench."""
     vehicle, keys, known = _read(path)
     check_on_road(vehicle)
     for name, one in known.items():

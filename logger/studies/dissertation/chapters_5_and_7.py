@@ -21,15 +21,7 @@ from logger.identification.unknown_road.road_fit import RoadFit, fit_roads
 from logger.identification.unknown_road.road_operator import RoadDrive
 from logger.modal import five_storey
 from logger.modal.decay import damping_of_two_peaks, decay_modes, proposals
-from logger.modal.five_storey import (
-    DAMPING_RATIO,
-    PRINTED_RMS,
-    SENSORS,
-    compare_sensors,
-    recorded,
-    released,
-    structure,
-)
+from logger.modal.five_storey import DAMPING_RATIO, PRINTED_RMS, SENSORS, compare_sensors, recorded, released, structure
 from logger.modal.mode import ModalResult
 from logger.modal.subspace import summed_spectrum
 from logger.profiles.track import Track

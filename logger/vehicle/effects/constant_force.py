@@ -13,9 +13,7 @@ from logger.vehicle.vehicle import Vehicle
 
 class ConstantForce(ForceEffect):
     title = "a constant force, such as a weight or the zero offset of the load cell"
-    parameters = (
-        Parameter("push_n", 20.0, -1e4, 1e4, 0.0, Scale.LINEAR, (-20.0, 20.0), "up positive"),
-    )
+    parameters = (Parameter("push_n", 20.0, -1e4, 1e4, 0.0, Scale.LINEAR, (-20.0, 20.0), "up positive"),)
     source = "A. Janot, M. Gautier, M. Brunot, EMPS, Workshop on Nonlinear System Identification Benchmarks (2019)"
     signature = "a free mass drifts; on a nonlinear spring the motion differs between the two directions"
     shown_by = "push it back and forth over its whole travel, weakly and strongly"

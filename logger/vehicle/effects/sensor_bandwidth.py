@@ -49,8 +49,7 @@ class SensorBandwidth(SensorEffect):
 
     def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
         """Also those of filters of low order that were run on the record's samples, and those of the filter that the
-        record seems to have gone through, and of the orders beside it.
-        """
+        record seems to have gone through, and of the orders beside it."""
         found = super().trials(seen)
         if seen is None or not seen.rate_hz:
             return found
@@ -64,8 +63,7 @@ class SensorBandwidth(SensorEffect):
 
     def delaying_trials(self, seen: Misalignment) -> list[list[dict[str, float]]]:
         """Filters of each order, from high cut-offs to low ones: what order and cut-off do differs by little more than
-        the delay that goes with them, so that no fit leads from one order to another.
-        """
+        the delay that goes with them, so that no fit leads from one order to another."""
         if not seen.rate_hz:
             return []
         highest_hz = _HIGHEST_OF_RATE * seen.rate_hz

@@ -10,9 +10,7 @@ from logger.vehicle.effect import Parameter, Scale, SensorEffect, Values
 
 class SensorGain(SensorEffect):
     title = "scale error of the sensor"
-    parameters = (
-        Parameter("gain", 1.05, 0.2, 5.0, 1.0, Scale.LOG, (0.93, 1.07), "reading over true acceleration"),
-    )
+    parameters = (Parameter("gain", 1.05, 0.2, 5.0, 1.0, Scale.LOG, (0.93, 1.07), "reading over true acceleration"),)
     source = "data sheets of accelerometers give scale errors of some per cent"
     signature = "the measurement is the model times one factor, at every frequency, speed and strength"
     shown_by = "turn the sensor over at rest: the readings must differ by 2 g"

@@ -14,10 +14,7 @@ _LITTLE, _WRONG = 1e-5, 0.0005
 
 class SpeedScale(DriveEffect):
     title = "the recorded speed and distance are wrong by a factor"
-    parameters = (
-        Parameter("scale", 1.01, 0.7, 1.4, 1.0, Scale.LOG, (0.98, 1.02), "recorded over true",
-                  step=1e-7),
-    )
+    parameters = (Parameter("scale", 1.01, 0.7, 1.4, 1.0, Scale.LOG, (0.98, 1.02), "recorded over true", step=1e-7),)
     source = "UN Regulation 39: a speedometer may read up to a tenth too much; worn tires change the rest"
     signature = "model and measurement drift apart with distance"
     shown_by = "drive a long stretch with a mark at each end, and measure it"

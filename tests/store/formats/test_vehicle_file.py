@@ -14,14 +14,7 @@ from logger.files import SETTINGS_BYTES
 from logger.printable import word
 from logger.shipped import vehicle_file, vehicle_names
 from logger.store.formats.effect_file import shipped_effects
-from logger.store.formats.vehicle_file import (
-    CarModel,
-    ModelStep,
-    read_model,
-    read_on_board,
-    read_vehicle,
-    write_model,
-)
+from logger.store.formats.vehicle_file import CarModel, ModelStep, read_model, read_on_board, read_vehicle, write_model
 from logger.store.formats.yaml_nodes import parse_mapping
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.models import MODELS, structure_of
