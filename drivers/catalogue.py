@@ -8,8 +8,6 @@ point that is called as the thing is, in a group called after the folder: ``ride
 ``logger.vehicle.effects``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from importlib import import_module
 from importlib.metadata import EntryPoint, entry_points

@@ -1,7 +1,5 @@
 """Chips on an I2C bus: their registers, what a failed transfer means, and buffers that the host empties."""
 
-from __future__ import annotations
-
 import errno
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence

@@ -7,8 +7,6 @@ so through a ``FileSystem``, and a test hands in one that fails. Every method ra
 refuses.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import stat

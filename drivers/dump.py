@@ -11,8 +11,6 @@ compressed stream without its end, is a torn tail: everything before it is given
 Anything else that is not as it should be is a ``DumpError`` that names file, line and what was expected.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import zlib
@@ -65,7 +63,7 @@ class DumpHeader:
     mass_kg: float | None = None
 
 
-def open_dump(path: str | os.PathLike[str]) -> DumpReader:
+def open_dump(path: str | os.PathLike[str]) -> "DumpReader":
     """Open a recording, compressed or not (its first bytes tell), and read its header.
 
     Raises ``DumpError`` when the file cannot be read or its first line is not the header of a dump.
@@ -100,7 +98,7 @@ class DumpReader:
             raise
         self._events = self._parse(first)
 
-    def __enter__(self) -> DumpReader:
+    def __enter__(self) -> "DumpReader":
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None

@@ -18,8 +18,6 @@ two boundaries. What a library raises is ``OSError`` with a number (``as_os_erro
 a source is ``DeviceError``, whatever it was (``as_device_error``: around every call of a ``Source``).
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import termios

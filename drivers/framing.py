@@ -13,8 +13,6 @@ the time at which the chunk holding that byte came in.
 - ``FixedFramer``  frames of one length, with or without start bytes
 """
 
-from __future__ import annotations
-
 import re
 from bisect import bisect_right
 from collections.abc import Callable

@@ -35,8 +35,6 @@ time before the date or after it: within a minute of midnight a date that is one
 time passed, is put right.
 """
 
-from __future__ import annotations
-
 import datetime
 from collections import deque
 from dataclasses import dataclass, field

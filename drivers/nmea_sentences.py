@@ -8,8 +8,6 @@ Sources: NMEA 0183 as described by the gpsd project ("NMEA Revealed"), with its 
 69 are 20xx).
 """
 
-from __future__ import annotations
-
 import datetime
 import re
 from collections.abc import Callable

@@ -8,8 +8,6 @@ have. What is left becomes a tree of nodes that know their line and hold their t
 decided by who asks for it (``number``, ``text``, ``boolean`` ...).
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace

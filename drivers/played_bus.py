@@ -6,8 +6,6 @@ raises the same ``OSError``. The recording runs against a clock that is handed i
 now.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 from collections.abc import Callable, Iterable, Iterator

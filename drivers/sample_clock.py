@@ -1,7 +1,5 @@
 """The times of samples whose instrument says none, out of the times at which they arrived."""
 
-from __future__ import annotations
-
 from itertools import combinations, pairwise
 from math import log, sqrt
 from typing import NamedTuple

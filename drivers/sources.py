@@ -4,8 +4,6 @@ A source knows nothing of retrying or threads. The bus and the port are given as
 them, so real and recorded ones look the same.
 """
 
-from __future__ import annotations
-
 import random
 import time
 from collections import deque

@@ -11,8 +11,6 @@ binary; RTCM 10403; Septentrio SBF; NovAtel OEM; SkyTraq; MediaTek; Trimble TSIP
 MicroStrain; MAVLink).
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Sequence
 from itertools import pairwise

@@ -5,8 +5,6 @@ of the code until a real device has settled it. Solution: a profile says where t
 they mean. Shipped ones lie in ``drivers/profiles``, anyone may name another by its path.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from importlib import resources
 from math import inf

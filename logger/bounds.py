@@ -6,8 +6,6 @@ with its line, and a least one, far below what any instrument resolves, under wh
 numbers as a file's lengths and rates ask for counts them first.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

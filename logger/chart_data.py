@@ -1,7 +1,5 @@
 """What a chart shows, as arrays: lines over an axis, shades over a grid, or bars. ``logger.report.charts`` draws it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -5,9 +5,8 @@
     '- CheckFailed     the check a command was asked to make found something wrong; exit 1
 """
 
-from __future__ import annotations
-
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 EXIT_DONE = 0
 EXIT_CHECK_FAILED = 1
@@ -30,6 +29,15 @@ class CheckFailed(RidelogError):
     """The check found something wrong."""
 
     exit_status = EXIT_CHECK_FAILED
+
+
+@contextmanager
+def as_bad_input(word: object = "", kind: type[Exception] = ValueError) -> Iterator[None]:
+    """What is complained of within, as BadInput that begins with a word: a file, a vehicle, an argument."""
+    try:
+        yield
+    except kind as error:
+        raise BadInput(f"{word}: {error}" if word else str(error)) from None
 
 
 _LEAST_PART = 4

@@ -8,8 +8,6 @@ and says which file it was. What is no file, such as a pipe, is written as it is
 Every change goes through ``drivers.disk``, as in the car: so a test can refuse any of them.
 """
 
-from __future__ import annotations
-
 import errno
 import hashlib
 import json
@@ -32,7 +30,7 @@ SETTINGS_BYTES = 256 * 1024  # Most of a file that a person writes
 STATE_BYTES = 4 * SETTINGS_BYTES  # Most of one that a program keeps, such as settings and vehicle beside a log
 MAP_BYTES = 256 << 20  # Most of a file that is unfolded whole in memory, as JSON is
 _BLOCK_BYTES = 1 << 20  # of the size of a large file's extents; a call costs nothing beside it
-_AGREED: ContextVar[_Agreed | None] = ContextVar("_AGREED", default=None)
+_AGREED: "ContextVar[_Agreed | None]" = ContextVar("_AGREED", default=None)
 _WRITTEN: ContextVar[list[Path] | None] = ContextVar("_WRITTEN", default=None)
 
 

@@ -1,7 +1,5 @@
 """Places on the ground some kilometres apart at most: the sphere laid flat where the first one is."""
 
-from __future__ import annotations
-
 from math import cos, hypot, radians
 from typing import Protocol
 

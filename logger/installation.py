@@ -8,8 +8,6 @@ removed. What has been changed by hand stays, and a newer version of it is put b
 fill a folder that is to become a machine's root. Logs are never touched.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

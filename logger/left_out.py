@@ -1,7 +1,5 @@
 """What a command did not use of what it was given: how much, and why, in one form for all of them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from typing import Any

@@ -5,8 +5,6 @@ whatever goes wrong in it becomes one line that names the file and the line in i
 stderr: stdout is for what the command was asked.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,7 +16,7 @@ from types import ModuleType
 from typing import Any
 
 from drivers.catalogue import CatalogueError, offers
-from logger.errors import BadInput, RidelogError
+from logger.errors import BadInput, RidelogError, as_bad_input
 from logger.files import SETTINGS_BYTES, read_bounded
 
 
@@ -27,10 +25,8 @@ def catalogue(package: str, offer: str) -> dict[str, Any]:
 
     Raises BadInput that names the file when one offers nothing, or something of another name than the file's.
     """
-    try:
+    with as_bad_input(kind=CatalogueError):
         return offers(package, offer)
-    except CatalogueError as error:
-        raise BadInput(str(error)) from None
 
 
 def offered_by(path: Path, offer: str) -> Any:

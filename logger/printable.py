@@ -7,15 +7,13 @@ text cannot be printed at all. Solution. What cannot be seen is shown by its num
 characters at most, and a cell that a spreadsheet would compute begins with an apostrophe.
 """
 
-from __future__ import annotations
-
 import re
 from typing import Any
 
 LONGEST_WORD = 80
 """Characters of a word from outside; of a longer one the middle is left out. That of ``drivers.errors.shortened``."""
 
-LONGEST_COMPLAINT = 80 * 24
+LONGEST_COMPLAINT = 24 * LONGEST_WORD
 """Characters of a complaint, which is one line: a terminal of the usual size, full."""
 
 # What Unicode counts as printable and draws as nothing: fillers, joiners, variation selectors and the empty pattern of

@@ -43,6 +43,7 @@ from typing import (
 )
 
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
+from logger.printable import LONGEST_WORD
 
 
 class Range(NamedTuple):
@@ -120,8 +121,6 @@ DAILY_HOURS = Range(0.001, 24.0, "hours")
 """Of riding, for values of health."""
 
 
-_MOST_SHOWN = 80
-"""Characters of a value in a complaint; a list of readings is longer."""
 _WORDS = {float: ("a number", "numbers"), int: ("a whole number", "whole numbers"), str: ("text", "texts"),
           Path: ("a path", "paths"), bool: ("True or False", "True or False")}
 """One of a kind, and several."""
@@ -184,7 +183,7 @@ def _shown(value: Any) -> str:
     if type(value).__module__ != "builtins":
         return f"of type {type(value).__name__}"
     words = " ".join(repr(value).split())
-    return words if len(words) <= _MOST_SHOWN else words[:_MOST_SHOWN - 3] + "..."
+    return words if len(words) <= LONGEST_WORD else words[:LONGEST_WORD - 3] + "..."
 
 
 def _named(kind: Any, unit: str, several: int = 0) -> str:
@@ -231,8 +230,8 @@ _IN_PYTHON = "\nIn Python: "
 """Where the part of a question's docstring begins that is of no use at the terminal."""
 
 
-def silent(_words: str) -> None:
-    """Ignore a message."""
+def silent(*_said: object) -> None:
+    """Ignore what is said."""
 
 
 @dataclass(frozen=True)

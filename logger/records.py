@@ -1,7 +1,5 @@
 """Frozen records that pass from the pipeline to the logs, the status and the reports."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 

@@ -1,7 +1,5 @@
 """One drive over one road, as fits, the lab and identification read it."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
@@ -237,7 +235,7 @@ class Run:
         """Of which samples (n,) something was read."""
         return np.ones(self.count, bool) if self.usable is None else np.asarray(self.usable != NO_READING)
 
-    def part(self, samples: slice) -> Run:
+    def part(self, samples: slice) -> "Run":
         """Some of its samples, of which more than the beginning has to be left."""
         return replace(self, measured_mps2=self.measured_mps2[samples], distance_m=self.distance_m[samples],
                        speed_mps=self.speed_mps[samples], more=self.more[:, samples],
@@ -316,7 +314,7 @@ class Run:
         return self.track.timed
 
     @property
-    def past(self) -> Past:
+    def past(self) -> "Past":
         """What nobody recorded of it."""
         return past_of(self.track)
 

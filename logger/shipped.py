@@ -5,8 +5,6 @@ command has no repository around it. Solution: the installation puts a copy insi
 taken where there is one, the original otherwise.
 """
 
-from __future__ import annotations
-
 from importlib import metadata
 from pathlib import Path
 

@@ -22,8 +22,6 @@ to sysfs. Solution: the buffer is set up where that can be done, or taken as som
 values are read one by one, and ``why_polled`` says what was missing.
 """
 
-from __future__ import annotations
-
 import errno
 import json
 import os

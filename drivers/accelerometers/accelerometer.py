@@ -8,8 +8,6 @@ The bytes of a live source, with their times, are all that a decoder gets: what 
 the same samples.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields

@@ -17,8 +17,6 @@ same numbers stand in the Linux kernel's driver [2].
 [2] drivers/iio/accel/adxl345_core.c
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from contextlib import suppress

@@ -12,8 +12,6 @@ description every ``CHECK_US``: when it is another one, the device has lost its 
 the kernel's notice shows nowhere but in the readings.
 """
 
-from __future__ import annotations
-
 import json
 import os
 from contextlib import suppress

@@ -9,8 +9,6 @@ The solution, three layers: a ``BytePort`` brings bytes, ``drivers.framing`` fin
 the arrival times.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, replace

@@ -3,8 +3,6 @@
 Suggestions of OpenStreetMap's ``smoothness`` per way, as a layer to be reviewed by a person.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import astuple, dataclass
 from pathlib import Path

@@ -6,8 +6,6 @@ the unit (``extraction.recorded_columns``); what is left is cut, laid on a profi
 be known is refused, with the option that says it.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import degrees
@@ -31,7 +29,7 @@ from logger.bounds import ACCELERATION, LONGEST_HOLE_S, MOVING_MPS, SPEED, sampl
 from logger.dsp.repeated_samples import find_holds, resolution, still_until_s
 from logger.dsp.resample import PASS_HZ
 from logger.dsp.whole_record import SEEN_OF_RATE
-from logger.errors import BadInput
+from logger.errors import BadInput, as_bad_input
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.receiver_delay import CarriedDelay, combined
 from logger.extraction.recorded_columns import (
@@ -134,10 +132,8 @@ def recorded_csv(source: Path, asked: CsvSettings, config: Config, tell: Tell) -
     time_s, samples, has_gravity = _accelerations(tables, asked, notes)
     origin_s = float(time_s[0]) if abs(time_s[-1]) > _LATEST_S else 0.0
     tell("resampling it")
-    try:
+    with as_bad_input(tables.acceleration.header.path):
         even = even_samples(time_s - origin_s, samples, RATE_HZ)
-    except ValueError as error:
-        raise BadInput(f"{tables.acceleration.header.path}: {error}") from None
     roles, held = AXES if samples.shape[1] > 1 else ("up",), find_holds(time_s, samples)
     notes += [doubt.words for doubt in still_doubts(roles, time_s, samples, held) if "axis" in doubt.numbers]
     notes += _repairs(even)

@@ -16,8 +16,6 @@ file that a user would write; ``diagnose`` names what is missing, ``add_effect``
 what is left here is the picture and the published figures beside.
 """
 
-from __future__ import annotations
-
 import gzip
 import zlib
 from collections.abc import Callable, Iterator, Mapping, Sequence

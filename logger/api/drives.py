@@ -1,7 +1,5 @@
 """Drives: recorded and simulated ones as runs, and the roughness of the road as a drive shows it."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -20,7 +18,7 @@ from logger.api.shown import CommandResult, Shown, checks_json, checks_lines, ta
 from logger.api.vehicles import car_on, check_forces, model_of
 from logger.chart_data import Array, Chart, Curves, Line, line
 from logger.dsp.channel_faults import released_at
-from logger.errors import BadInput
+from logger.errors import BadInput, as_bad_input
 from logger.estimation.batch import (
     RESOLVED_SHARE,
     SPEED_CLASS_MPS,
@@ -324,10 +322,8 @@ def assessed(run: Run, model: vehicle_file.CarModel, sensor: Sensor, learns_nois
         raise BadInput(f"{run.file}{'' if error.sample is None else f':{error.sample + 2}'}: {error}") from None
     if road is not None:
         _check_road(run, ready.distance_m, road, model, warn, anyway)
-    try:
+    with as_bad_input(model.vehicle.name):
         return assess(ready, model.vehicle, sensor, window_m, road, learns_noise, model.effects, model.errors)
-    except ValueError as error:
-        raise BadInput(f"{model.vehicle.name}: {error}") from None
 
 
 def _check_road(run: Run, distance_m: Array, road: Track, model: vehicle_file.CarModel, warn: Notify,
@@ -561,14 +557,10 @@ def simulation(question: SimulateQuestion) -> Simulation:
         track, doubt = _road(question)
     car = car_on(model.vehicle, effects, said, track)
     outputs = _outputs(question.outputs, car.vehicle, car.structure)
-    try:
+    with as_bad_input():
         motion = _motion(question, car, track)
-    except ValueError as error:
-        raise BadInput(str(error)) from None
-    try:
+    with as_bad_input(car.vehicle.name):
         columns = _columns(question, car, track, motion, outputs)
-    except ValueError as error:
-        raise BadInput(f"{car.vehicle.name}: {error}") from None
     run = _run(question, columns, track)
     accel, rate_hz = run.accel_z_mps2, question.rate_hz
     away = drive_file.COLUMNS[2:] if track.timed else ()
@@ -710,7 +702,5 @@ def _road(question: SimulateQuestion) -> tuple[Track, str]:
     else:
         profile = given if isinstance(given, profile_file.Wheelpaths) else read_profile(given)
         track, doubt = drive_file.track_of(profile), doubt_of(profile.elevation_m, profile.spacing_m)
-    try:
+    with as_bad_input():
         return virtual_drive.with_obstacles(track, _obstacles(question)), doubt
-    except ValueError as error:
-        raise BadInput(str(error)) from None

@@ -4,8 +4,6 @@ It does not matter what recorded it: a dump of the box, which is decoded here, a
 logger (``csv_recording``) end here.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
@@ -18,7 +16,7 @@ from drivers.errors import SettingsError
 from drivers.readings import folder_name
 from logger.arrays import Array, Bools
 from logger.dsp.resample import GRID_RATE_HZ
-from logger.errors import BadInput
+from logger.errors import BadInput, as_bad_input
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.receiver_delay import CarriedDelay, combined
 from logger.extraction import along_track
@@ -116,10 +114,8 @@ class MeasuredProfile:
 def read_measured_profile(path: Path) -> MeasuredProfile:
     """A profile with ``lat_deg,lon_deg``. Raises BadInput for one that is not what it should be."""
     profile, places = read_profile(path, judged=True), read_places(path)
-    try:
+    with as_bad_input(path):
         return MeasuredProfile(path, profile, along_track.MeasuredLine.of(*places))
-    except ValueError as error:
-        raise BadInput(f"{path}: {error}") from None
 
 
 # --- what was recorded ---
@@ -134,7 +130,7 @@ class Fixes:
     lat_deg: Array
     lon_deg: Array
 
-    def part(self, which: Any) -> Fixes:
+    def part(self, which: Any) -> "Fixes":
         """Some of them."""
         return Fixes(self.time_s[which], self.speed_mps[which], self.lat_deg[which], self.lon_deg[which])
 
@@ -177,10 +173,8 @@ def apart(time_s: Array) -> Bools:
 
 def folder_of(source: Path, word: str) -> str:
     """What a recording is called, as the name of its run's folder. BadInput where it can be none."""
-    try:
+    with as_bad_input(source, SettingsError):
         return folder_name(word)
-    except SettingsError as error:
-        raise BadInput(f"{source}: {error}") from None
 
 
 def write_runs(recorded: Recorded, source: Path, name: str, out: Path, measured: MeasuredProfile | None, tell: Tell

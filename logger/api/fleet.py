@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from logger.api.log_questions import IngestQuestion, ReportQuestion, SummariseQuestion, day_us
 from logger.api.shown import CommandResult
-from logger.errors import BadInput
+from logger.errors import BadInput, as_bad_input
 from logger.files import MAP_BYTES, note, read_bounded, replace_bytes
 from logger.fleet.dataset import EXTRA, Dataset, Engine, existing, opened
 from logger.fleet.road_map import RoadMap, RoadPieces, cell_keys, pieces_of
@@ -161,10 +161,8 @@ def _keys(dataset: Dataset, roads: Path | None) -> Iterator[tuple[Keyed, str]]:
     digest = sha256(content).hexdigest()
     if not dataset.is_new and digest != dataset.manifest.roads:
         raise BadInput(f"{roads or dataset.folder / _ROADS}: expected the roads of the first ingest")
-    try:
+    with as_bad_input(roads or dataset.folder / _ROADS):
         pieces = pieces_of(read_road_lines(roads or dataset.folder / _ROADS))
-    except ValueError as error:
-        raise BadInput(f"{roads or dataset.folder / _ROADS}: {error}") from None
     if dataset.is_new:
         replace_bytes(dataset.folder / _ROADS, content)
     yield RoadMap(pieces).keys, digest

@@ -1,7 +1,5 @@
 """A car that nobody measured, learned from ordinary drives: answer, words and page."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -17,7 +15,7 @@ from logger.api.shared_fields import each
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, read_vehicle
 from logger.chart_data import Chart, Curves, Line
-from logger.errors import BadInput, CheckFailed
+from logger.errors import BadInput, CheckFailed, as_bad_input
 from logger.estimation.drive_spectra import (
     BLOCK_S,
     DRIVE_SPECTRA,
@@ -27,6 +25,7 @@ from logger.estimation.drive_spectra import (
     middles_hz,
     spectra_of_fields,
 )
+from logger.estimation.rms_calibration import SPEEDS_MPS
 from logger.identification.unknown_car import (
     COORDINATES,
     Array,
@@ -50,7 +49,6 @@ from logger.store.formats.record_file import TIME, VERTICAL, even_rate_hz
 from logger.store.formats.vehicle_file import CarModel, write_model
 from logger.store.log.log_name import OwnFile, inside_of, log_name
 from logger.store.log.sidecar import read_sidecar
-from logger.units import MPH_MPS
 from logger.vehicle.named_parameters import changed, read
 from logger.vehicle.published_cars import NUMBERS, USUAL_MASS_KG, coordinates_of, number_errors, share_of
 from logger.vehicle.vehicle import GENERIC
@@ -80,7 +78,6 @@ kg 1.6."""
 _LIMP, _ONE_SPEED = 0.1, 1.5
 """A damping ratio below it is that of a worn damper (new ones have 0.2 to 0.4); a ratio of speeds that is too small to
 tell the car's frequencies from the road's waves."""
-_SPEEDS_MPH = (10, 20, 30, 40, 50, 60, 70)
 _COMPARED = (*(f"{end}.{name}" for end in ("front", "rear") for name in ("bounce_hz", "damping_ratio", "hop_hz")),
              "wheelbase_m")
 
@@ -393,10 +390,10 @@ def _answer(question: LearnCarQuestion, used: Sequence[_Used], problem: UnknownC
             missing: Sequence[str], unseen: Sequence[tuple[DriveSpectra, LearnedCar]]) -> LearnedVehicle:
     knowledge, own = problem.knowledge, len(NUMBERS)
     errors = _unseen_errors(knowledge, unseen)
-    speeds = [mph * MPH_MPS for mph in _SPEEDS_MPH]
     noise = float(np.nanmedian(problem.noise) * np.exp(car.x[-1]))
     level = float(np.exp(np.median(car.roads.level)))
-    now, ever = (dict(zip(speeds, map(float, iri_errors(knowledge, x, covariance, speeds, noise, level)), strict=True))
+    now, ever = (dict(zip(SPEEDS_MPS, map(float, iri_errors(knowledge, x, covariance, SPEEDS_MPS, noise, level)),
+                          strict=True))
                  for x, covariance in ((car.x, car.covariance), (knowledge.mean, knowledge.covariance)))
     mass = USUAL_MASS_KG if question.mass_kg is None else _sprung_side_kg(question.mass_kg, car.x)
     vehicle = knowledge.car(car.x, mass, "learned-car")
@@ -406,14 +403,14 @@ def _answer(question: LearnCarQuestion, used: Sequence[_Used], problem: UnknownC
     deviations = {name: _slope(name, values[name]) * float(car.std[at]) for at, name in enumerate(shown)}
     unknown = list(_not_identifiable(problem, car))
     moved = list(_changes(question, car)) if question.compare else []
-    misfits = list(_misfits(used, knowledge, car, speeds, noise, level))
+    misfits = list(_misfits(used, knowledge, car, SPEEDS_MPS, noise, level))
     seconds = sum(one.seconds for one in used)
     as_json = {
         "parameters": values, "standard_errors": deviations, "sensor_ahead_of_middle_m": float(car.x[own + 1]),
         "drives": len(used), "seconds": seconds, "blocks": len(problem.spectra),
         "speed_low_mps": float(problem.spectra.speed_mps.min()),
         "speed_high_mps": float(problem.spectra.speed_mps.max()),
-        "iri": [{"speed_mps": speed, "std_share": now[speed], "std_share_before": ever[speed]} for speed in speeds],
+        "iri": [{"speed_mps": speed, "std_share": now[speed], "std_share_before": ever[speed]} for speed in SPEEDS_MPS],
         "kept_back": errors, "sprung_mass_kg": mass, "mass_is_convention": question.mass_kg is None,
         "converged": car.is_converged, "not_identifiable": unknown,
         "effects_missing": list(missing), "changes": moved, "other_than_settings": misfits}
@@ -521,10 +518,8 @@ def _changes(question: LearnCarQuestion, car: LearnedCar) -> Iterator[str]:
     """What has changed since another file was learned."""
     assert question.compare is not None
     before = read_vehicle(question.compare)
-    try:
+    with as_bad_input(question.compare):
         x = coordinates_of(before.vehicle)
-    except ValueError as error:
-        raise BadInput(f"{question.compare}: {error}") from None
     spread = _coordinate_errors(before)
     found = []
     for name in _COMPARED[:-1]:

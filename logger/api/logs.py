@@ -15,7 +15,7 @@ from drivers.errors import DriverError
 from drivers.readings import GPS, Event, Fix
 from logger.api.shown import Shown, table
 from logger.arrays import Array, Bools
-from logger.errors import BadInput
+from logger.errors import BadInput, as_bad_input
 from logger.printable import word
 from logger.records import WindowRecord
 
@@ -140,15 +140,13 @@ class Dump(Shown):
         """The accelerometer's samples, decoded by its driver. BadInput for a header that names what cannot be."""
         from logger.service.wiring import config_for_dump, instrument
 
-        try:
+        with as_bad_input(self.path, DriverError):
             config = config_for_dump(self.header, None, "rav4-2009", place=f"{self.path}:1").accelerometer
             decoder = instrument(config).decoder
             for event in self.events:
                 if event.source == config.driver:
                     decoder.feed(event.t_us, event.data)
             decoder.flush()
-        except DriverError as error:
-            raise BadInput(f"{self.path}: {error}") from None
         block = decoder.take()
         return Samples(block.t_us.astype(np.float64) * _US, block.accel_mps2, block.clipped)
 
@@ -179,8 +177,5 @@ def read_dump(path: Path | str) -> Dump:
     >>> dump.samples().accel_mps2.shape[1], len(dump.fixes()) > 0
     (3, True)
     """
-    try:
-        with open_dump(path) as reader:
-            return Dump(Path(path), reader.header, tuple(reader), reader.torn_tail)
-    except DriverError as error:
-        raise BadInput(str(error)) from None
+    with as_bad_input(kind=DriverError), open_dump(path) as reader:
+        return Dump(Path(path), reader.header, tuple(reader), reader.torn_tail)

@@ -21,7 +21,7 @@ from logger.api.shown import CommandResult, Shown, table
 from logger.api.vehicles import Model, model_of
 from logger.arrays import Bools, Complex
 from logger.chart_data import Array, Chart, Curves, Line, line
-from logger.errors import BadInput
+from logger.errors import BadInput, as_bad_input
 from logger.estimation.car_response import WAVE_NUMBERS_CPM
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.modal.analysis import decays, find_modes
@@ -121,12 +121,10 @@ def vehicle_modes(
     model = model_of(vehicle)
     check_moves_itself(model.vehicle)
     psd = RoadSpectrum.of_iri(iri_m_per_km).psd(WAVE_NUMBERS_CPM)
-    try:
+    with as_bad_input(model.vehicle.name):
         known = known_vehicle(model.vehicle, model.effects)
         cars = [one.at(speed_mps, WAVE_NUMBERS_CPM, psd)
                 for one in (known, *cars_off(model.vehicle, model.effects, model.errors))]
-    except ValueError as error:
-        raise BadInput(f"{model.vehicle.name}: {error}") from None
     found, frequency_std_hz, damping_std = mode_errors(cars[0], cars[1:])
     columns = (np.array([one.frequency_hz for one in found]), frequency_std_hz,
                np.array([one.damping_ratio for one in found]), damping_std)
@@ -241,10 +239,8 @@ def modes_of_drive(given: ChannelRecord | Path | str, question: ModesQuestion) -
         raise question.complaint(f"{name}: expected `from_s` before `to_s`, within {time_s[0]:g} to {time_s[-1]:g} s")
     if not np.ptp(samples[inside]) > 0:
         raise BadInput(f"{name}: expected an acceleration that varies, found {samples[inside][0]:g} m/s2 throughout")
-    try:
+    with as_bad_input(name):
         found = car_modes(model.vehicle, samples[inside], speed_mps[inside], usable[inside], rate_hz)
-    except ValueError as error:
-        raise BadInput(f"{name}: {error}") from None
     return Found(found, METHOD, Channels((VERTICAL,), float(time_s[inside][0]), rate_hz, samples[inside][:, None]))
 
 

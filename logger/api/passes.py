@@ -3,8 +3,6 @@
 Figures, words and JSON, layers for other programs (cells as lines, places as points), and the page.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
@@ -71,7 +69,7 @@ class RepeatedDrives(CommandResult):
     lat_deg: Array
     lon_deg: Array
     heading_deg: Array
-    _found: CombinedDrives
+    _found: "CombinedDrives"
 
     title: ClassVar[str] = "Passes"
 

@@ -1,7 +1,5 @@
 """How a ride feels: acceleration records, their ISO 2631-1 values of comfort and health, and frequency weightings."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite

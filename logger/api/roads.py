@@ -1,7 +1,5 @@
 """Roads: measured profiles and random ones, their IRI and their class (ISO 8608), each with its words and JSON."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path

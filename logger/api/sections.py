@@ -3,8 +3,6 @@
 On a layer a section is a line, of the windows whose middles lie in it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
@@ -18,7 +16,7 @@ from logger.api.log_questions import SectionsQuestion, length_of
 from logger.api.shown import CommandResult
 from logger.chart_data import Array, Chart, Curves, Line
 from logger.comfort.iso2631 import comfort_word
-from logger.errors import BadInput
+from logger.errors import BadInput, as_bad_input
 from logger.exchange import layer
 from logger.left_out import left_out_json, left_out_lines
 from logger.printable import counted
@@ -62,7 +60,7 @@ class Sections(CommandResult):
     a_w_mps2: Array
     speed_mps: Array
     condition: npt.NDArray[np.str_]
-    _drives: tuple[DriveSections, ...]
+    _drives: "tuple[DriveSections, ...]"
     _units: DisplayUnits
 
     title: ClassVar[str] = "Sections"
@@ -111,14 +109,12 @@ def sections(question: SectionsQuestion) -> Sections:
         UNITS[units])
 
 
-def _on_route(files: Sequence[LoggedFile], path: Path | str, length_m: float) -> Iterator[DriveSections]:
+def _on_route(files: Sequence[LoggedFile], path: Path | str, length_m: float) -> "Iterator[DriveSections]":
     route = read_route(path)
-    try:
+    with as_bad_input(path):
         measure_m = measures(route.lat_deg, route.lon_deg, route.begin_m, route.end_m,
                              np.column_stack([route.post_lat_deg, route.post_lon_deg]), route.post_m)
         network = route_network(route.lat_deg, route.lon_deg, measure_m)
-    except ValueError as error:
-        raise BadInput(f"{path}: {error}") from None
     return route_sections(files, network, float(measure_m[0]), length_m)
 
 

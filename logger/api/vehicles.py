@@ -14,7 +14,7 @@ from logger.api.drive_questions import CalibrateQuestion
 from logger.api.shown import CommandResult, Shown, table
 from logger.chart_data import Array, Chart, Curves, Line
 from logger.comfort.iso2631 import COMFORT_WORDS
-from logger.errors import BadInput
+from logger.errors import BadInput, as_bad_input
 from logger.estimation import rms_calibration
 from logger.estimation.rms_calibration import LEVELS_IRI, CalibrationSettings, RmsLine, SpeedCalibration
 from logger.files import write_text
@@ -79,10 +79,8 @@ class Model(vehicle_file.CarModel, Shown):
         80.0
         """
         effect, file = effect_file.effect_named(name)
-        try:
+        with as_bad_input(name):
             one = chosen(effect, effect.usual | values, file=file)
-        except ValueError as error:
-            raise BadInput(f"{name}: {error}") from None
         effect_file.check_on(self.vehicle, one, two_tracks=True)
         return replace(self, effects=with_effect(self.effects, one))
 
@@ -212,14 +210,10 @@ def car_on(vehicle: Vehicle, effects: Sequence[Chosen], said: Mapping[str, str],
     """The vehicle with its effects, which are possible on this road; ``said`` where, by name. BadInput for one that is
     not, ValueError as ``compose``."""
     for one in effects:
-        try:
+        with as_bad_input(said[one.effect.name], BadInput):
             effect_file.check_on(vehicle, one, track.two_tracks, track.timed, bool(track.acts_on))
-        except BadInput as error:
-            raise BadInput(f"{said[one.effect.name]}: {error}") from None
-    try:
+    with as_bad_input(vehicle.name):
         return compose(vehicle, effects)
-    except ValueError as error:
-        raise BadInput(f"{vehicle.name}: {error}") from None
 
 
 @dataclass(frozen=True, eq=False)
@@ -316,10 +310,8 @@ def calibrated(model: vehicle_file.CarModel, path: Path | None, question: Calibr
         question.progress(f"{vehicle.name}: found in {found.path}")
         return Calibrated(vehicle, settings, found.speeds)
     started_s = time.perf_counter()
-    try:
+    with as_bad_input(vehicle.name):
         speeds = rms_calibration.calibrate(known_vehicle(vehicle, model.effects), gain, settings)
-    except ValueError as error:
-        raise BadInput(f"{vehicle.name}: {error}") from None
     took_s = time.perf_counter() - started_s
     path = keep(kept_in, key, speeds)
     where = (f"kept in {path}" if path else "not kept" if not kept_in else

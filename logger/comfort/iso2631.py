@@ -1,7 +1,5 @@
 """Ride comfort and health by ISO 2631-1, of a record, and of a day."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

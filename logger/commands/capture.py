@@ -12,13 +12,13 @@ import numpy as np
 from drivers.accelerometers import line_reader
 from drivers.dump import DumpHeader, DumpWriter, Event
 from drivers.hardware import BytePort, open_serial, port_advice
+from drivers.sources import READ_BYTES
 from logger.errors import BadInput
 from logger.question import Argument, Checked, Option, Question, Verb, more_than_0
 from logger.service.main_loop import monotonic_us as now_us
 from logger.service.systemd_notify import stopped_by_signals
 from logger.units import US_PER_S
 
-_CHUNK_BYTES = 4096
 _WAIT_S = 0.2
 _LOOK_BYTES = 65536
 _SHOWN_BYTES = 64
@@ -126,7 +126,7 @@ def _record(port: BytePort, writer: DumpWriter, seconds: float | None, stopped: 
     fault = None
     while not stopped() and (seconds is None or now_us() - start_us < seconds * US_PER_S):
         try:
-            data = port.read(_CHUNK_BYTES, _WAIT_S)
+            data = port.read(READ_BYTES, _WAIT_S)
         except OSError as error:
             fault = error.strerror or str(error)
             break

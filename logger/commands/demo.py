@@ -30,6 +30,7 @@ from logger.commands.replay import ReplayQuestion, replayed
 from logger.demo import BEYOND, CAR, DRIVES, FIELD, FOURTH, LAB, LINE, TrueCar
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import make_folder, together, write_file, write_text
+from logger.question import silent
 from logger.report.quantities import columns, wrapped
 
 if TYPE_CHECKING:
@@ -178,7 +179,7 @@ _LAB_EXPLAINED = {
 def lab(out: Path, unpack_only: bool, as_json: bool) -> None:
     """Unpack the drives into ``out`` and find what is missing."""
     from logger.api.lab.bench import bench_with, require_compiler, sought_effects
-    from logger.api.lab.loop import chapter, unsaid_lines
+    from logger.api.lab.loop import chapter
 
     if not unpack_only:
         require_compiler("ridelog demo --lab", sought_effects().values())
@@ -191,7 +192,7 @@ def lab(out: Path, unpack_only: bool, as_json: bool) -> None:
     if not as_json:
         print(wrapped([_INTRODUCTION]))
     given = bench_with(CompareQuestion(LAB.vehicle, folders, warn=warned))
-    found = walk(given, out, take, unsaid_lines if as_json else say, _explained)
+    found = walk(given, out, take, silent if as_json else say, _explained)
     if as_json:
         print(json.dumps(found.as_json(), allow_nan=False))
         return
@@ -251,7 +252,7 @@ def field(out: Path, unpack_only: bool, as_json: bool) -> None:
     """Unpack the drives into ``out``, find what is missing, and judge the fourth with and without it."""
     from logger.api.lab.bench import require_compiler
     from logger.api.lab.loop import as_json as story_json
-    from logger.api.lab.loop import ending, figures_of, iri_blocks, unsaid_lines
+    from logger.api.lab.loop import ending, figures_of, iri_blocks
     from logger.report.blocks import text
     from logger.store.formats.effect_file import shipped_effects
 
@@ -265,7 +266,7 @@ def field(out: Path, unpack_only: bool, as_json: bool) -> None:
                           "lines": [str(out / LINE), str(out / BEYOND)]}) if as_json else
               f"Four drives and two measured lines in {out}\nNext: {commands.extract()[0]}")
         return
-    tell: Say = unsaid_lines if as_json else say
+    tell: Say = silent if as_json else say
     tell([wrapped(_ABOUT)])
     tell(_headed("Extract", "extract", *commands.extract()))
     extracted = [*(_extracted(one, out, LINE, tell) for one in first), _extracted(fourth, out, BEYOND, tell)]

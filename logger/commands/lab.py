@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 from logger.api.lab.question import LAB, LabLoopQuestion, LabQuestion
 from logger.commands.options import asked, declare, help_of, keep_freed_memory, progress, respelled
 from logger.errors import EXIT_DONE, BadInput
+from logger.question import silent
 
 if TYPE_CHECKING:
     from logger.api.lab.bench import Bench
@@ -30,7 +31,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Carry out ``ridelog lab``."""
     from logger.api.lab.bench import bench_with
-    from logger.api.lab.loop import always, unsaid_lines
 
     keep_freed_memory()
     with respelled(LabLoopQuestion):
@@ -38,20 +38,20 @@ def run(args: argparse.Namespace) -> int:
         given = bench_with(question, "ridelog lab")
     asks = not (args.yes or args.json) and sys.stdin.isatty()
     ask = _asking(question) if asks else take if args.yes or args.json else _taking()
-    story = walk(given, Path(question.out), ask, unsaid_lines if args.json else say,
-                 learns=_wants_a_law if asks else always)
+    story = walk(given, Path(question.out), ask, silent if args.json else say,
+                 learns=_wants_a_law if asks else lambda: True)
     if args.json:
         print(json.dumps(story.as_json(), allow_nan=False))
     return EXIT_DONE
 
 
-def walk(given: Bench, out: Path, ask: Ask, notify: Say, explain: Explain | None = None,
-         learns: Learns | None = None) -> LabStory:
+def walk(given: Bench, out: Path, ask: Ask, notify: Say, explain: Explain = lambda *_: "",
+         learns: Learns = lambda: True) -> LabStory:
     """Go through the loop, as ``loop.walk``, with its progress on the screen. BadInput as ``make_ready``."""
     from logger.api.lab import loop
 
     loop.make_ready(given, out, "--out")
-    return loop.walk(given, out, ask, notify, progress, explain or (lambda *_: ""), learns or loop.always)
+    return loop.walk(given, out, ask, notify, progress, explain, learns)
 
 
 # --- at the terminal ---

@@ -4,8 +4,6 @@ A fault that is expected, whatever the verb, becomes one line on stderr and an e
 asked for failed, 2 wrong use or bad input, 130 and 141 as shells name an interrupt and a closed pipe.
 """
 
-from __future__ import annotations
-
 import argparse
 import importlib
 import os

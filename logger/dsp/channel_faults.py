@@ -7,8 +7,6 @@ slowly, be it rounded or not. And masses, dampers and springs are positive: a fo
 motion as if all of them were negative, whatever else acts.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from logger.arrays import Array, Bools

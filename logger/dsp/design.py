@@ -17,8 +17,6 @@ counts for a coarse sensor on a smooth road, whose single steps reach up to half
 Sources: ISO 2631-1:1997 Annex A; T. I. Laakso et al., Splitting the unit delay, IEEE SP Magazine 13(1), 1996 (Thiran).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

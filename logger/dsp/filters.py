@@ -11,8 +11,6 @@ zeros is exact: a row has the same bits whether the rest of its block has arrive
 product of the same shape, so no split of the input can change a bit, and no sample waits for its block to fill.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

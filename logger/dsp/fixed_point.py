@@ -80,8 +80,6 @@ rounding makes every step depend on the last one, so this is a loop over samples
 for a sample and section.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -337,7 +335,7 @@ class FixedFilter:
         self._sections = [_Section(section) for section in cascade.sections]
 
     @classmethod
-    def for_acceleration(cls, sos: SectionRows) -> FixedFilter:
+    def for_acceleration(cls, sos: SectionRows) -> "FixedFilter":
         """The sections ``sos`` in 32 bits for accelerations within +-16 g, in m/s2."""
         return cls(fixed_cascade(sos, FULL_SCALE_MPS2))
 

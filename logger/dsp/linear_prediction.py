@@ -4,8 +4,6 @@ A stationary process is predicted from its covariances (Levinson and Durbin) or 
 from the first sample on: sample k is predicted from all of the k before it, up to the order.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

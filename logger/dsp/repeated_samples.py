@@ -1,7 +1,5 @@
 """Samples that are none: repeated ones, those at the end of a range, and bursts of calls."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import exp, log

@@ -10,8 +10,6 @@ unchanged. Short holes are bridged and marked; a long one ends the run, and the 
 Both parts are streams: how the samples were split into calls changes nothing, not even in the last bit.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from itertools import pairwise
@@ -67,10 +65,10 @@ class _Readings:
     def __len__(self) -> int:
         return len(self.t_us)
 
-    def part(self, which: slice | Bools) -> _Readings:
+    def part(self, which: slice | Bools) -> "_Readings":
         return _Readings(self.t_us[which], self.values[which], self.clipped[which])
 
-    def then(self, later: _Readings) -> _Readings:
+    def then(self, later: "_Readings") -> "_Readings":
         return _Readings(np.concatenate([self.t_us, later.t_us]), np.concatenate([self.values, later.values]),
                          np.concatenate([self.clipped, later.clipped]))
 

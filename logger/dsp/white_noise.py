@@ -7,8 +7,6 @@ the share of its power that lies above it (N. Wiener, Extrapolation, Interpolati
 Series, 1949). Where the spectrum has no plateau nothing is changed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 

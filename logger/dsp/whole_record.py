@@ -22,8 +22,6 @@ They are sought as a correction of straight lines, so that what a hole leaves op
 windowed sinc (``low_pass``) to the rate that is wanted: of a lower one it passes all up to 0.45 of the rate.
 """
 
-from __future__ import annotations
-
 from functools import lru_cache
 from math import ceil
 from typing import Any

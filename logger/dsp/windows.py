@@ -7,8 +7,6 @@ Samples taken while the car stands belong to no average. A window that does not 
 the next (start or end of a drive, a break) is `partial`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import nan, sqrt
@@ -52,11 +50,11 @@ class GridSamples:
     def __len__(self) -> int:
         return len(self.t_us)
 
-    def part(self, low: int, high: int) -> GridSamples:
+    def part(self, low: int, high: int) -> "GridSamples":
         """Samples low..high-1."""
         return GridSamples(*(getattr(self, name)[low:high] for name in self.__dataclass_fields__))
 
-    def chosen(self, keep: Bools) -> GridSamples:
+    def chosen(self, keep: Bools) -> "GridSamples":
         """The samples where ``keep`` (n,) is true."""
         return GridSamples(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
 
@@ -92,7 +90,7 @@ class Window:
     peak_mps2: float
     flags: frozenset[str]
 
-    def without_figures(self) -> Window:
+    def without_figures(self) -> "Window":
         """The window as if too few of its samples were good."""
         return replace(self, accel_rms_mps2=nan, a_w_mps2=nan, mtvv_mps2=nan, vdv_mps175=nan, peak_mps2=nan)
 

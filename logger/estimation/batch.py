@@ -18,8 +18,6 @@ estimate alone does not say how good it is or could be: ``assess`` sets beside i
 knew the road's spectrum, the sensor's noise and the car exactly.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from fractions import Fraction
@@ -116,7 +114,7 @@ def monotonic_distance(distance_m: Array, speed_mps: Array, rate_hz: float) -> A
 def estimated(
     car: KnownCar, sensor: Sensor, window_m: float, reading_mps2: Array, distance_m: Array,
     off: Sequence[KnownCar] = (), is_measured: bool = True, noise_log_std: float = 0.0,
-) -> tuple[Windows, RoadProfile | None]:
+) -> "tuple[Windows, RoadProfile | None]":
     """Windows and road of a drive on the grid of 100 Hz, arrays (t,) as ``RoadEstimator.push`` takes them; ``off``,
     ``is_measured`` the cars that it may be instead, and ``noise_log_std`` how well the noise is known, as
     ``RoadEstimator`` has them."""

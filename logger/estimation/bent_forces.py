@@ -8,8 +8,6 @@ solved again. The motion is not known exactly: a law is asked for its mean over 
 off the corners that would keep the two from coming to rest.
 """
 
-from __future__ import annotations
-
 from math import sqrt
 
 import numpy as np

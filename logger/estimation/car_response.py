@@ -1,8 +1,6 @@
 """How a car's reading depends on the road, by frequency: the bridge from a car to the estimator. Its acceleration at a
 steady speed, and what even readings of it leave open."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache

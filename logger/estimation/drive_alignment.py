@@ -9,8 +9,6 @@ acceleration, curves and hills come to little; the direction that goes with the 
 (``receiver_delay``). Stretches of a drive are compared with what was before.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import degrees, hypot, radians
 

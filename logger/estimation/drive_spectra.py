@@ -10,8 +10,6 @@ The expected power of a band is linear in the spectrum of the readings: ``expect
 window included, so that a resonance which is narrower than the window biases nothing.
 """
 
-from __future__ import annotations
-
 from base64 import b64decode, b64encode
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -73,7 +71,7 @@ class DriveSpectra:
     def __len__(self) -> int:
         return len(self.speed_mps)
 
-    def part(self, chosen: Bools | slice) -> DriveSpectra:
+    def part(self, chosen: Bools | slice) -> "DriveSpectra":
         """Some of the blocks."""
         return DriveSpectra(self.speed_mps[chosen], self.spread[chosen], self.power[chosen], self.noise[chosen],
                             np.unique(self.drive[chosen], return_inverse=True)[1])

@@ -20,8 +20,6 @@ Rounding counts as white noise of step / sqrt(12). Where the noise does not blur
 not what rounding does, and an estimator that takes it as bounds can do a little better than this says.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, pi, sqrt

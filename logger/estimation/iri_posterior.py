@@ -7,8 +7,6 @@ steady speed both are integrals over wave numbers: of the road's spectrum S, gai
 left.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 from math import pi, sqrt

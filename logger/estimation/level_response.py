@@ -11,8 +11,6 @@ block as far as they moved in the blocks before. The difference of both slopes i
 both solutions bounds and road go along with a level that changes, so that they need not be found anew.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -4,8 +4,6 @@ The service must not import scipy (memory), so the error function is computed he
 al., Numerical Recipes, 6.2: its relative error is below 1.2e-7 everywhere, also far out in the tail.
 """
 
-from __future__ import annotations
-
 from math import pi, sqrt
 
 import numpy as np

@@ -9,8 +9,6 @@ road leaves, (1 / M + W) m = W e in the waves of m, with W the weights of the re
 of which the road is found. A rough road that hides a line has it in itself already: what is felt stays right.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from logger.arrays import Array, Complex

@@ -12,8 +12,6 @@ its place. A few rounds with the solution of the whole stretch settle it. A read
 on one side only.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import log
 

@@ -31,8 +31,6 @@ with it (0.005 s too little in simulated cars that pitch by 4 degrees per g).
 [3] B. Efron, C. Stein, The jackknife estimate of variance, Annals of Statistics 9, 1981.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -100,10 +98,10 @@ class DelayInformation:
     gravity: Array
     blocks: int
     log_likelihood: Array
-    early: tuple[BlockInformation, ...] = ()
+    early: "tuple[BlockInformation, ...]" = ()
 
     @classmethod
-    def none(cls) -> DelayInformation:
+    def none(cls) -> "DelayInformation":
         """Before the first block."""
         d = len(DELAYS_S)
         return cls(np.zeros((GROUPS, d, 3, 3)), np.zeros((GROUPS, d, 3)), np.zeros(GROUPS), np.zeros(3), 0,

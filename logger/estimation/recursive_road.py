@@ -6,8 +6,6 @@ in a few steps from where that one ended, and the belief follows. The first bloc
 rounds. Where readings are bounds, they move with the road's level: how, is learned on the way (``level_response``).
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from copy import copy
 from dataclasses import dataclass, replace
@@ -267,7 +265,7 @@ class FollowedRoad:
             self._roughness.curvature = self._response.curvature
         return result
 
-    def _raised_from(self, block: Block, answer: Answer) -> FollowedRoad:
+    def _raised_from(self, block: Block, answer: Answer) -> "FollowedRoad":
         """As before the round of ``answer``, with a level that is higher than in it and stays; learns nothing."""
         raised = copy(self)
         raised._other, raised._learner = copy(self._other), None

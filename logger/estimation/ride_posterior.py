@@ -5,8 +5,6 @@ what the readings leave open of it is, by frequency, |W|^2 S N / (S + N): S the 
 that of the noise, W the weighting. Where nothing was read, all of |W|^2 S is.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import exp, hypot, sqrt

@@ -24,8 +24,6 @@ that shape. One window of 7.62 m is a short look: at 31 m/s it lasts a quarter o
 body, and the estimate scatters by a fifth to a third about the exact IRI. ``estimation.streaming`` does better.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import overload
@@ -44,7 +42,8 @@ from logger.units import MPH_MPS, WINDOW_M
 from logger.vehicle.linearise import KnownCar
 from logger.vehicle.vehicle import Vehicle, with_load
 
-SPEEDS_MPS = tuple(mph * MPH_MPS for mph in range(10, 71, 10))
+SPEEDS_MPH = tuple(range(10, 71, 10))
+SPEEDS_MPS = tuple(mph * MPH_MPS for mph in SPEEDS_MPH)
 LEVELS_IRI = tuple(float(iri) for iri in range(1, 11))  # the roads of 6.4 [m/km]
 ROADS = 120
 PASSENGER_KG = 75.0

@@ -17,8 +17,6 @@ Both grids are periodic. In space the road goes on unseen for longer than it rem
 ``ENTRY_S`` are where the car's memory of what came before dies, and their readings must have no weight.
 """
 
-from __future__ import annotations
-
 from copy import copy
 from dataclasses import dataclass
 from functools import lru_cache
@@ -34,7 +32,7 @@ from logger.estimation.time_grid import at_readings, frequencies_hz
 ENTRY_S = 2.5
 UNSEEN_M = 60.0
 SLOWEST_MPS = 0.4
-_MARGIN_M = 5.0
+MARGIN_M = 5.0
 _FAST_SHARE = 0.98
 _SPEED_CLASSES_PER_E = 10
 _DRIFT_BELOW_HZ = 0.1
@@ -119,9 +117,9 @@ class Block:
         self.grid = grid
         self.car = car
         self.spacing_m = spacing_m
-        first_m = distance_m[0] - car.behind_m.max() - _MARGIN_M
+        first_m = distance_m[0] - car.behind_m.max() - MARGIN_M
         self.start_m = float(np.floor(first_m / align_m) * align_m)
-        self.count = quick_fft_length((distance_m[-1] + _MARGIN_M + UNSEEN_M - self.start_m) / spacing_m)
+        self.count = quick_fft_length((distance_m[-1] + MARGIN_M + UNSEEN_M - self.start_m) / spacing_m)
         self._waves = _waves_of(self.count, spacing_m)
         self.wave_number_cpm, self.log_waves = self._waves.wave_number_cpm, self._waves.log_waves
         speed_mps = np.gradient(distance_m) * rate_hz
@@ -139,7 +137,7 @@ class Block:
         self.mean_speed_mps = float(speed_mps[self.moving].mean()) if self.moving.any() else SLOWEST_MPS
         self._speed_class = np.round(np.log(np.maximum(speed_mps, SLOWEST_MPS)) * _SPEED_CLASSES_PER_E).astype(int)
 
-    def on(self, grid: TimeGrid) -> Block:
+    def on(self, grid: TimeGrid) -> "Block":
         """The same stretch, driven by a car whose axles stand as this one's do and that answers otherwise."""
         other = copy(self)
         other.grid, other.car = grid, grid.car
@@ -225,7 +223,7 @@ class Block:
         drift = amplitudes @ self.grid.drift
         return Solution(waves, waves * factor, white, explained + drift, drift, amplitudes, information, gain)
 
-    def carried_over(self, earlier: Block, waves: Complex) -> Complex:
+    def carried_over(self, earlier: "Block", waves: Complex) -> Complex:
         """``waves`` of an earlier block on the same spacing as they lie in this one; road that is new is still flat.
 
         Innovations are local, so they can be cut and shifted where elevations would get an edge.

@@ -5,8 +5,6 @@ and waviness are learned on the way, so they are kept where they can be separate
 middle of those that shake a car.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import exp, log
 
@@ -37,7 +35,7 @@ class RoadSpectrum:
     waviness: float
 
     @classmethod
-    def of_iri(cls, iri_m_per_km: float, waviness: float = 2.0) -> RoadSpectrum:
+    def of_iri(cls, iri_m_per_km: float, waviness: float = 2.0) -> "RoadSpectrum":
         """The spectrum whose degree of roughness Gd(n0) belongs to this IRI (Eq 4.40 of Blum 2015)."""
         gd_n0 = gd_n0_from_iri(iri_m_per_km) * CM3_M3
         return cls(log(gd_n0) - waviness * log(PIVOT_CPM / REFERENCE_N0_CPM), waviness)

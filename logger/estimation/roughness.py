@@ -19,8 +19,6 @@ L is that of the mean precision, as much below. What was found of cells that no 
 Kalman filter, for such processes are Markov's. Their variances are learned by scoring in the evidence.
 """
 
-from __future__ import annotations
-
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -120,7 +118,7 @@ class RoadLevels:
         """Of L, what each process of ``LENGTHS_M`` makes of it, as learned."""
         return np.append(self._scored.values, COMMON_DEVIATIONS[0] ** 2)
 
-    def held_at(self, log_variance: Array) -> RoadLevels:
+    def held_at(self, log_variance: Array) -> "RoadLevels":
         """The same road with this log variance (n,), point by point of one block, which stays."""
         held = copy(self)
         held._held = log_variance

@@ -1,7 +1,5 @@
 """Variances that a drive tells little by little: scoring in the evidence, block by block."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from logger.arrays import Array

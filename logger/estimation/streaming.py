@@ -6,8 +6,6 @@ the body's slow swing, still depend on a road already driven; windows longer tha
 Splitting the readings differently changes nothing.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce

@@ -1,7 +1,5 @@
 """A drive along a measured line: the line, the motion, and how it is laid on the line."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -43,7 +41,7 @@ class MeasuredLine:
     lon_deg: float
 
     @staticmethod
-    def of(distance_m: Array, lat_deg: Array, lon_deg: Array) -> MeasuredLine:
+    def of(distance_m: Array, lat_deg: Array, lon_deg: Array) -> "MeasuredLine":
         """By geographic coordinates (m,) [degrees]. ValueError for fewer than two places, distances that do not grow,
         and places that cannot be so far apart on the ground, or lie much nearer together."""
         if len(distance_m) < 2:

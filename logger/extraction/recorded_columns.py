@@ -12,8 +12,6 @@ usual pace until it says that the car went farther than its places would hide; b
 what it had. Places alone give the speed from each to the next.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import atan, radians
 from typing import Any
@@ -37,7 +35,7 @@ from logger.dsp.repeated_samples import (
 from logger.dsp.whole_record import mean_rate_hz, on_even_grid
 from logger.estimation.drive_alignment import MOVED_DEG, angle_rad, has_moved, sitting
 from logger.geodesy import EARTH_RADIUS_M
-from logger.units import STANDARD_GRAVITY_MPS2
+from logger.units import DAY_US, STANDARD_GRAVITY_MPS2, US_PER_S
 
 KEPT_STANDING_S = 5.0
 
@@ -309,7 +307,7 @@ def _instant(time_s: Array, samples: Array) -> float:
     return float(0.5 * (at_s[(place := int(np.argmin(left)))] + at_s[place + 1]))
 
 
-DAY_S = 86_400.0
+DAY_S = DAY_US / US_PER_S
 _DRIFT = 1e-4
 _JUMP_S = 0.7
 """Both as on board (``service/timebase``)."""

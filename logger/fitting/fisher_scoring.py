@@ -6,8 +6,6 @@ information, are; the latter at many times the price. Each step solves the infor
 as the expected gain falls: few simulated drives give a few numbers' slopes another steepness than their mean has.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Generic, Protocol, TypeVar
@@ -66,13 +64,13 @@ class _Curvature:
     along: Array
 
     @staticmethod
-    def of(information: Array, moving: Bools) -> _Curvature:
+    def of(information: Array, moving: Bools) -> "_Curvature":
         """As the information says."""
         whiten = whitening(information[np.ix_(moving, moving)])
         nothing = np.zeros(len(whiten))
         return _Curvature(information, moving, whiten, np.eye(len(whiten)), nothing, nothing)
 
-    def after(self, slopes: Array) -> _Curvature:
+    def after(self, slopes: Array) -> "_Curvature":
         """Corrected by the slopes (r,) that the step led to."""
         if not (size := float(self.along @ self.along)) > 0:
             return self

@@ -3,8 +3,6 @@
 Rows may differ by powers of ten, as a mass and an offset do; so every matrix is scaled to a unit diagonal first.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

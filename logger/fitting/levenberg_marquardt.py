@@ -8,8 +8,6 @@ derivatives serve on for as long as steps gain what was predicted, which is for 
 believed only with fresh ones.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Generic, Protocol, TypeVar

@@ -32,8 +32,6 @@ road with others, directly or through others, make groups of their own, each wit
 that could be known. Without the growth a car of the second year would be charged with a year's decay.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

@@ -1,7 +1,5 @@
 """From logs to the rows of a dataset."""
 
-from __future__ import annotations
-
 import csv
 import hmac
 import io
@@ -96,7 +94,7 @@ def keep_names(dataset: Path, names: Iterable[str], key: bytes) -> None:
 _COUNTS = ("segment", "drive")
 _NUMBERS = ("distance_start_m", "distance_end_m", "lat_deg", "lon_deg", "speed_mps", "iri_m_per_km", "iri_std_m_per_km",
             "a_w_mps2", "duration_s", "iri_level_std_m_per_km", "iri_common_std_m_per_km", "iri_place_std_m_per_km")
-_LARGEST_COUNT = 2**31 - 1  # Of a dataset's column; no logger counts so far
+_LARGEST_COUNT = np.iinfo(np.int32).max  # Of a dataset's column; no logger counts so far
 _LARGEST = {column.name: column.largest for column in COLUMNS}
 
 
@@ -394,7 +392,7 @@ def ingest_sessions(dataset: Dataset, sessions: Sequence[Session], keyed: Keyed,
     return counts
 
 
-def _read_together(sessions: Sequence[Session], past: _Past, counts: Counts
+def _read_together(sessions: Sequence[Session], past: "_Past", counts: Counts
                    ) -> Iterator[list[tuple[Session, list[tuple[bytes, str]]]]]:
     """Sessions that are not known whole, and the bytes of their logs, some megabytes at a time."""
     # Of logs that are read at once, at least: beyond it the cost of a reading no longer counts.
@@ -416,7 +414,7 @@ def _read_together(sessions: Sequence[Session], past: _Past, counts: Counts
         yield together
 
 
-def _take(session: Session, read: Sequence[LogColumns], past: _Past, waiting: _Waiting, counts: Counts,
+def _take(session: Session, read: Sequence[LogColumns], past: "_Past", waiting: _Waiting, counts: Counts,
           keyed: Keyed, trim_m: float) -> None:
     filed = filed_rows(_once(joined_columns([one.columns for one in read])), keyed, trim_m)
     rows = filed.columns

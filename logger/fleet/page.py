@@ -10,8 +10,6 @@ may load scripts: so each tile is one, which calls ``fleetTile``.
 The folder of a report is written beside its place, and moved there when it is whole.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -12,8 +12,6 @@ and direction, of the row itself and of its neighbours along the drive, so that 
 parallel road. Rows near no road get the key of their cell.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -7,8 +7,6 @@ its laws are; derivatives are differences of such drives, over steps on the scal
 lies on the road in closed form.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -198,7 +196,7 @@ class _TrackWithObstacles:
     timed = False
     acts_on = ()
 
-    def as_it_is(self, surface: Alterations, actuators: Alterations) -> _TrackWithObstacles:
+    def as_it_is(self, surface: Alterations, actuators: Alterations) -> "_TrackWithObstacles":
         """The road itself under the obstacles, which stay what they are."""
         return replace(self, track=self.track.as_it_is(surface, actuators))
 

@@ -13,8 +13,6 @@ of each number and in units of the noise, are looked at before anything is belie
 And a model that at its best leaves as much as there was has not been fitted to this record, whatever its numbers.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -17,8 +17,6 @@ cannot be trusted. Residuals that follow the road mean that the car's model miss
 themselves are biased.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol

@@ -13,8 +13,6 @@ the data cannot identify. Solution, in this order:
 It knows models by ``Predictor`` only.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Protocol

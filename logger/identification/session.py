@@ -8,8 +8,6 @@ away from the real one has the real one behind a hill. Solution: it is laid at e
 fits best there, and the place that leaves the least is taken; near enough for a fit to begin.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial

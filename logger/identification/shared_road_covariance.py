@@ -14,8 +14,6 @@ covariance of the estimates is the one that correlated residuals give: A (sum S_
 whitened C_ij and A the covariance of independent ones. The estimates themselves stay what they are.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np

@@ -14,8 +14,6 @@ The response is the half car's (``vehicle.linear_car``); the speed's spread with
 the interference between the axles.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache, partial
@@ -353,7 +351,7 @@ class UnknownCar:
         """How fast the suspensions move in each block (b,), up to a factor of the car: root of level times speed."""
         return np.asarray(np.sqrt(np.exp(car.roads.level) * self.spectra.speed_mps))
 
-    def learn(self) -> tuple[UnknownCar, LearnedCar]:
+    def learn(self) -> "tuple[UnknownCar, LearnedCar]":
         """The car, and the problem without the blocks that are impulsive with it: which those are follows from the car,
         so that it is found again."""
         problem, car = self, self.fit()

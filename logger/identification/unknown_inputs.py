@@ -16,8 +16,6 @@ are differences of the shape's first and second integral along the road. Both ha
 What passes is described as ``TirePath`` does it: an elevation at each place, and a mean from each place to the next.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -26,7 +24,7 @@ from typing import Any
 import numpy as np
 
 from logger.arrays import Array
-from logger.profiles.track import SHORT_STEP_M
+from logger.profiles.track import POINT_M
 from logger.vehicle.named_parameters import WEAKEST, Free
 
 # A shorter patch is taken for one of this length [m].
@@ -107,7 +105,7 @@ class ObstaclePath:
             at, area = ((front - rear) / (2 * half)
                         for front, rear in zip(one.integrals(x + half), one.integrals(x - half), strict=True))
             step = np.diff(x)
-            short = np.abs(step) < SHORT_STEP_M
+            short = np.abs(step) < POINT_M
             elevation[part] = at
             mean[part.start : part.stop - 1] = np.where(short, (at[1:] + at[:-1]) / 2,
                                                         np.diff(area) / np.where(short, 1, step))

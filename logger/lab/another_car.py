@@ -9,8 +9,6 @@ with this one's numbers: one round of the search for effects, on the car as its 
 were refitted to such a record are no car's any more).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial

@@ -6,8 +6,6 @@ refitted under their priors, and the residuals of that are tested. A number that
 allows is reported: a missing effect biases it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -46,7 +44,7 @@ class Standing:
     signals: Mapping[str, float]
 
     @staticmethod
-    def of(runs: SimulatedRuns, car: Car, predictions: Sequence[Array], responses: Sequence[Response]) -> Standing:
+    def of(runs: SimulatedRuns, car: Car, predictions: Sequence[Array], responses: Sequence[Response]) -> "Standing":
         """The standing of a car with these predictions and motions."""
         main = [run.main(one) for run, one in zip(runs.runs, predictions, strict=True)]
         residuals = ModelResiduals(runs.runs, car, main, responses)

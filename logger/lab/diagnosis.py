@@ -7,8 +7,6 @@ where no car moves it. A residual above that is unexplained, and so is one that 
 with their priors. Noise that has a colour is distinguished from physics by what it does not depend on.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial

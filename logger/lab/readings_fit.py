@@ -11,8 +11,6 @@ numbers together shifts the run, and the fit is repeated there; both, until noth
 the free numbers has the distance errors integrated out (D. J. C. MacKay, Neural Computation 4, 1992).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 

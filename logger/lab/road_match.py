@@ -8,8 +8,6 @@ variance shows how large chance is (the correlogram of unrelated series: M. S. B
 Statistical Society 98, 1935).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import astuple, dataclass
 

@@ -13,8 +13,6 @@ spectrum, which show no heavily damped mode. On the records of ``tests/benchmark
 missed modes that n4sid or ssi found, or reported some that are not there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

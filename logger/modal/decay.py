@@ -26,8 +26,6 @@ With noise the rank is full and the order has to be chosen. The realisations of 
 is the upper left corner of the largest, so a whole stabilisation diagram costs one singular value decomposition.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

@@ -17,8 +17,6 @@ Every number starts at the vehicle's and is believed to lie within a factor of s
 reading does not show keeps a large standard error, and its mode is not reported. Damping cannot come out negative.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

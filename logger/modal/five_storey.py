@@ -16,8 +16,6 @@ exact at the sampling instants: the free motion through the matrix exponential, 
 constant over each of several steps within a sample.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

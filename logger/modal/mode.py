@@ -14,8 +14,6 @@ bandwidth. What is less certain has to show more, not less: its standard errors 
 order. What is known to a sixth of its half bandwidth needs no such witness: larger models split what is heavily damped.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -59,7 +57,7 @@ class ModalResult:
     rejected: tuple[Rejected, ...]
     order: int
     how: str
-    diagram: tuple[OrderPoles, ...] = ()
+    diagram: "tuple[OrderPoles, ...]" = ()
 
 
 @dataclass(frozen=True)

@@ -27,8 +27,6 @@ noise. Summing those of equal segments smooths it, at the price of resolution. T
 window.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 

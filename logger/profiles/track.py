@@ -21,11 +21,10 @@ import numpy.typing as npt
 
 from logger.arrays import Array
 
-# A patch shorter than this is a point: averages over less would drown in rounding, and no profile is so fine.
-_POINT_M = 1e-4
-_MOST_SPACINGS = 5_000_000  # as many samples as a simulation may hold in memory at once
-# The mean over a step shorter than this is that of its two ends, for the same reason.
-SHORT_STEP_M = 1e-4
+# A patch shorter than this is a point, and the mean over a shorter step that of its two ends: averages over less would
+# drown in rounding, and no profile is so fine.
+POINT_M = 1e-4
+MOST_STEPS = 5_000_000  # what a simulation may hold in memory at once
 # Knots nearer to each other than this share of a spacing are one.
 _SAME_KNOT = 1e-9
 _KEPT_PATHS = 3
@@ -204,12 +203,12 @@ class TirePath:
     def __init__(self, start_m: float, spacing_m: float, elevation_m: Array, patch_m: float) -> None:
         if not patch_m >= 0:
             raise ValueError(f"expected a contact patch of 0 m or more, found {patch_m}")
-        if patch_m > _MOST_SPACINGS * spacing_m:
+        if patch_m > MOST_STEPS * spacing_m:
             raise OverflowError(f"expected a contact patch that is a part of a road, found {patch_m} m")
         self._spacing_m = spacing_m
         self._base_m = float(elevation_m.mean())
         heights = elevation_m - self._base_m
-        if patch_m < _POINT_M:
+        if patch_m < POINT_M:
             heights = np.concatenate([heights[:1], heights, heights[-1:]])
             self._origin_m, self._second = start_m - spacing_m, 0.0
             slope = np.append(np.diff(heights), 0.0) / spacing_m
@@ -239,7 +238,7 @@ class TirePath:
         elevation = height + along * (slope + along * (0.5 * bend))
         integral = integral + along * (height + along * (0.5 * slope + along * (bend / 6)))
         step = np.diff(distance_m)
-        short = np.abs(step) < SHORT_STEP_M
+        short = np.abs(step) < POINT_M
         mean = np.diff(integral) / np.where(short, 1.0, step)
         if short.any():
             mean[short] = 0.5 * (elevation[:-1] + elevation[1:])[short]

@@ -5,8 +5,6 @@ are classes that the page's style sheet fills in, so that one chart reads on lig
 library; a picture file (``drawn``) is made by matplotlib, which the ``report`` extra brings, for papers and slides.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from io import BytesIO
@@ -191,7 +189,7 @@ def _curves(one: Curves) -> list[Html]:
     return parts + _key(names, below_px)
 
 
-def _faint(frame: _Frame, line: Line, shape: _Shape) -> list[Html]:
+def _faint(frame: _Frame, line: Line, shape: "_Shape") -> list[Html]:
     points = frame.points(zip(shape.x, shape.y, strict=True))
     return [html('<path class="level" d="M{}"/>', " ".join(points)),
             _words(frame.x(float(shape.x[-1])) + 6, frame.y(float(shape.y[-1])) + 4, line.name)]
@@ -207,7 +205,7 @@ class _Shape:
     high: Array
 
     @classmethod
-    def of(cls, line: Line, log_x: bool, log_y: bool) -> _Shape:
+    def of(cls, line: Line, log_x: bool, log_y: bool) -> "_Shape":
         """On these axes. A band that reaches below 0 ends, on a logarithmic axis, a thousandth above it."""
         errors = np.zeros(1) if line.errors is None else line.errors
         low, high = line.y - errors, line.y + errors

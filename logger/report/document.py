@@ -13,8 +13,6 @@ other one runs even if a hostile file got a tag past us. A notebook shows a resu
 within its own cell.
 """
 
-from __future__ import annotations
-
 import json
 from base64 import b64encode
 from collections.abc import Iterable
@@ -33,10 +31,10 @@ class Html(str):
 
     __slots__ = ()
 
-    def __add__(self, other: str) -> Html:
+    def __add__(self, other: str) -> "Html":
         return Html(str.__add__(self, escaped(other)))
 
-    def __radd__(self, other: str) -> Html:
+    def __radd__(self, other: str) -> "Html":
         return Html(str.__add__(escaped(other), self))
 
 

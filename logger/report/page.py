@@ -10,8 +10,6 @@ kept where neighbours are alike, and what is left is deflated byte by byte of eq
 all zero cost nothing.
 """
 
-from __future__ import annotations
-
 import json
 import zlib
 from base64 import b64encode
@@ -394,8 +392,7 @@ def rank(name: str, names: tuple[str, ...]) -> str:
     return str(names.index(name)) if name in names else "x"
 
 
-UNKNOWN = -(2**31)  # Stands for a value that is not known
-_MOST = 2**31 - 1
+UNKNOWN, _MOST = np.iinfo(np.int32).min, np.iinfo(np.int32).max  # the first stands for a value that is not known
 _DEG = 1e6  # Steps in a degree: 0.11 m, the six decimals that RFC 7946 (section 11.2) calls enough
 Ints = npt.NDArray[np.uint32]
 Column = tuple[str, float, int, Array]

@@ -1,8 +1,6 @@
 """Rows of logs that have a place, as arrays; which of several drives lie on one place of the road, and what they say
 together; and what of logs stands in no figure, and why."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 

@@ -3,8 +3,6 @@
 Self-contained, in the style of the report.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 from logger.report import document as doc

@@ -7,8 +7,6 @@ or a bad bridge driven both ways, does not fill the list.
 At a terminal it is one screen of text, whether it can draw blocks or not.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass

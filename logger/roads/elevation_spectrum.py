@@ -32,8 +32,6 @@ values of |s| whose slopes have the correlation rho are correlated themselves: t
 squared, is sqrt(1 - rho^2) + rho asin(rho) - 1. Its integral along the road is how much the IRI spreads.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

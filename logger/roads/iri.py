@@ -7,8 +7,6 @@ the World Bank's Technical Paper 46 ends at 24 m/km; 100 is said to be doubtful 
 with a word. Hills and slopes do not count: the IRI of an even slope is 0.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise

@@ -12,8 +12,6 @@ chance in it than as long a stretch of a real road has: over a whole period ther
 differ, cut them out of a road many times longer.
 """
 
-from __future__ import annotations
-
 import numpy as np
 import numpy.typing as npt
 

@@ -4,8 +4,6 @@ All are functions of distance, so that they can be laid on any profile and on ea
 between its samples: an edge that is steep here is as steep there as one step of the track allows.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -11,8 +11,6 @@ does not fall with anything; the difference of two periods does not have it. So 
 over one place have alike.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -64,7 +62,7 @@ class Passes:
         """Of each, without what is common to all [(m/km)2]."""
         return self.iri_errors.std**2 - self.iri_errors.parts()[1] ** 2
 
-    def of(self, which: Bools) -> Passes:
+    def of(self, which: Bools) -> "Passes":
         """Some of them, as marked (p,)."""
         return Passes(self.key[which], self.drive[which], self.time_s[which], self.iri_m_per_km[which],
                       self.iri_errors.of(np.flatnonzero(which)), self.known_m[which])

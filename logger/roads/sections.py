@@ -29,8 +29,6 @@ The IRI of a section is the mean of the rectified slope over it (ASTM E1926), so
 length; a window across a limit counts in both sections by its parts.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, fields
 from math import log, pi
 
@@ -60,7 +58,7 @@ class WindowErrors:
     place_std: Array
 
     @classmethod
-    def undivided(cls, std: Array) -> WindowErrors:
+    def undivided(cls, std: Array) -> "WindowErrors":
         """Of which the whole alone is known."""
         nothing = np.full(len(std), np.nan)
         return cls(std, nothing, nothing, nothing)
@@ -79,7 +77,7 @@ class WindowErrors:
         return (np.where(possible, self.level_std, self.std), np.where(possible, self.common_std, 0.0),
                 np.where(possible, self.place_std, 0.0))
 
-    def of(self, rows: Ints) -> WindowErrors:
+    def of(self, rows: Ints) -> "WindowErrors":
         return WindowErrors(*(getattr(self, one.name)[rows] for one in fields(self)))
 
 
@@ -195,7 +193,7 @@ class SectionWindows:
     iri_errors: WindowErrors
     mean_square: Array
 
-    def of(self, rows: npt.NDArray[np.intp]) -> SectionWindows:
+    def of(self, rows: npt.NDArray[np.intp]) -> "SectionWindows":
         return SectionWindows(self.start_m[rows], self.end_m[rows], self.duration_s[rows], self.iri_m_per_km[rows],
                               self.iri_errors.of(rows), self.mean_square[rows])
 

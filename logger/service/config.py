@@ -7,8 +7,6 @@ Solution. One dataclass per section holds of each key its default and how it is 
 ``config/ridelog.yaml`` is the documentation, and holds every key with its default.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from datetime import date

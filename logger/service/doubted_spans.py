@@ -1,8 +1,6 @@
 """Stretches of a drive that are not believed: a sensor that stands still or repeats itself, a wrong speed; and what
 readings and fixes are judged by as they come."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Sequence
 from math import sqrt

@@ -12,8 +12,6 @@ stands where the pipeline stands in a replay (``event_core``), so that bytes bec
 filters and checks; but it keeps them, where the pipeline makes rows of them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -5,8 +5,6 @@ event that lies beyond the next lattice point; so the rows depend on the events 
 time, how long the process slept or how fast a recording is played.
 """
 
-from __future__ import annotations
-
 import logging
 from typing import Protocol
 

@@ -10,8 +10,6 @@ A dump holds what the core was given while it was recorded, in that order: what 
 by time. So nothing of the drivers' part is done again, and what the live service made of the drive comes out.
 """
 
-from __future__ import annotations
-
 import gc
 import logging
 import sys

@@ -10,8 +10,6 @@ is known, over a short loss bridged, and when no fix has come for longer than th
 `blind`. Nothing here reads a clock or a file.
 """
 
-from __future__ import annotations
-
 from collections import deque
 from dataclasses import dataclass, replace
 from math import hypot, isfinite, nan

@@ -1,8 +1,6 @@
 """The live service put together (devices, threads, log, status and watchdog), and what it reports of itself: a snapshot
 for the status file, a line for systemd."""
 
-from __future__ import annotations
-
 import logging
 import os
 import shutil

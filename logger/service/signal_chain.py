@@ -13,8 +13,6 @@ steps), the power of the noise is taken off the readings, which needs no model. 
 figure is the word that a bound allows.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from math import ceil, isfinite
@@ -53,7 +51,7 @@ class Axis:
     sign: float
 
     @classmethod
-    def from_word(cls, word: str) -> Axis:
+    def from_word(cls, word: str) -> "Axis":
         """``+z``, ``-x``, ..."""
         return cls("xyz".index(word[-1]), -1.0 if word.startswith("-") else 1.0)
 

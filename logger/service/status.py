@@ -8,8 +8,6 @@ memory (renamed into place, so a reader never sees half of one). It carries the 
 its making, by which ``trouble`` distinguishes a living service from a dead, hung or never started one.
 """
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Mapping

@@ -4,8 +4,6 @@ Nothing in here raises what the disk says; ``status`` reports it and it is tried
 with it the sensors, the status file and the watchdog.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from functools import partial

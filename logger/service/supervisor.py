@@ -5,8 +5,6 @@ put back is found soon. Whatever leaves a source is retried, for no fault of one
 the program goes to the log with its trace. A wrong setting is not retried.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Callable
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """The service as a process of the system: what it tells systemd, its turn, and its end."""
 
-from __future__ import annotations
-
 import contextlib
 import logging
 import os

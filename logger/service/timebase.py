@@ -1,7 +1,5 @@
 """The time and the way of a drive: seconds by the receiver, metres by its speed."""
 
-from __future__ import annotations
-
 from collections import deque
 from dataclasses import dataclass
 

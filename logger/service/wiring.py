@@ -4,8 +4,6 @@ Readings that come at another rate than a recording's header says are refused: a
 and every window would be flagged for it without a word on why.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from datetime import date
@@ -27,7 +25,7 @@ from logger.dsp.filters import BlockFilter
 from logger.dsp.fixed_point import FixedFilter
 from logger.dsp.resample import GRID_RATE_HZ
 from logger.dsp.weightings.wk import WEIGHTING
-from logger.errors import BadInput
+from logger.errors import BadInput, as_bad_input
 from logger.estimation.car_response import LOG_WAVES, WAVE_NUMBERS_CPM, CarResponse
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.drive_spectra import SpectraKeeper
@@ -61,7 +59,7 @@ from logger.vehicle.uncertain import cars_off, not_known
 from logger.vehicle.vehicle import GENERIC
 
 
-def check_recorded_rate(dump: Path, sensor: Instrument) -> None:
+def check_recorded_rate(dump: Path, sensor: "Instrument") -> None:
     """Raise BadInput where the readings of a sensor that is read several times per sample came too seldom for that."""
     looked_at = 2000  # events
     slower = 1.5  # as many times as long between most readings is no busy bus, but another rate
@@ -296,7 +294,7 @@ def config_for_dump(header: DumpHeader, given: Config | None, vehicle: str | Non
                           "wheelbase_m": header.wheelbase_m, "mass_kg": header.mass_kg})
     config = given or Config()
     axis, noise_mps2 = config.accelerometer.vertical_axis, config.accelerometer.noise_mps2
-    try:
+    with as_bad_input(place, SettingsError):
         kind = accelerometers()[said.name("driver", "", tuple(accelerometers()))]
         if given is None:
             axis, noise_mps2 = said.name("vertical_axis", axis, AXES), _noise_setting(said, is_loggers(header.gps))
@@ -309,8 +307,6 @@ def config_for_dump(header: DumpHeader, given: Config | None, vehicle: str | Non
             vehicle = said.name("vehicle", "", vehicle_names(), "--vehicle FILE.yaml or ")
             config = replace(config, wheelbase_m=said.number_or_none("wheelbase_m", None, *WHEELBASES_M),
                              mass_kg=said.number_or_none("mass_kg", None, *MASSES_KG))
-    except SettingsError as error:
-        raise BadInput(f"{place}: {error}") from None
     return replace(config, accelerometer=sensor, gps=replace(config.gps, baud=baud),
                    vehicle=config.vehicle if vehicle is None else vehicle_path(vehicle))
 
@@ -318,10 +314,8 @@ def config_for_dump(header: DumpHeader, given: Config | None, vehicle: str | Non
 def receiver_for_dump(header: DumpHeader, config: Config, place: str = "header") -> CarriedDelay:
     """What was known of the receiver's delay when the recording began, unless the settings say a number. Raises
     BadInput, beginning with ``place``, where the recording says what cannot be."""
-    try:
+    with as_bad_input(place):
         return delay_at_start(config.gps, DELAY.from_fields(header.gps))
-    except ValueError as error:
-        raise BadInput(f"{place}: {error}") from None
 
 
 def noise_for_dump(header: DumpHeader, config: Config, place: str = "header") -> KnownNoise | None:
@@ -330,12 +324,10 @@ def noise_for_dump(header: DumpHeader, config: Config, place: str = "header") ->
     if config.accelerometer.noise_mps2 != AUTO:
         return None
     said = header.accelerometer.get("noise", {})
-    try:
+    with as_bad_input(place):
         known = NOISE.from_fields(said)
         # Recordings by programs that learned the noise of the mean of several readings say nothing of one.
         return known if said.get(_READS, 1) == instrument(config.accelerometer).reads else None
-    except ValueError as error:
-        raise BadInput(f"{place}: {error}") from None
 
 
 def _noise_setting(said: RecordedWords, by_logger: bool) -> float | str | None:

@@ -1,7 +1,5 @@
 """What a recorder would see: a car driven over a road, or stood on a rig, with its effects."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -13,7 +11,7 @@ import numpy as np
 
 from logger.arrays import Array
 from logger.profiles.excitation import Excitation
-from logger.profiles.track import Track, WheelTracks
+from logger.profiles.track import MOST_STEPS, Track, WheelTracks
 from logger.roads.obstacles import OBSTACLES
 from logger.runs import ACCELERATION, SENSOR, Past, Run, Signal, zero_is_known
 from logger.simulation.beginning import Beginning, beginning, begins_unknown
@@ -143,7 +141,7 @@ class SimulatedRuns:
         self._steppers = ThreadPoolExecutor(_STEPPERS)
         self._passages: list[dict[tuple[float, bytes, WheelTracks, bool], Passage]] = [{} for _ in self.runs]
 
-    def in_steps(self, fine_hz: float) -> SimulatedRuns:
+    def in_steps(self, fine_hz: float) -> "SimulatedRuns":
         """The runs simulated in at least so many steps a second, with the same caches."""
         found = copy(self)
         found.fine_hz = fine_hz
@@ -238,7 +236,6 @@ def _recorded(car: Car, passage: Passage, run: Run) -> Array:
 AFTER_S = 1.0
 """How long a drive at one speed goes on after the last wheel has left the profile."""
 OBSTACLE_SPACING_M = 0.01
-_MOST_STEPS = 5_000_000  # what a simulation may hold in memory at once
 _LARGEST_M = 10_000.0  # of an obstacle
 _NEARLY = 1e-6  # of a step: what rounding may do
 _FEWEST_STEPS = 2  # of the road, that an obstacle spans
@@ -287,8 +284,8 @@ def with_obstacles(track: Track, obstacles: Sequence[Obstacle]) -> Track:
         return track
     parts = int(np.ceil(track.spacing_m / OBSTACLE_SPACING_M - 1e-9))
     count = (len(track.elevation_m) - 1) * parts + 1
-    if count > _MOST_STEPS:
-        longest_km = _MOST_STEPS * OBSTACLE_SPACING_M / 1000
+    if count > MOST_STEPS:
+        longest_km = MOST_STEPS * OBSTACLE_SPACING_M / 1000
         raise ValueError(f"{obstacles[0].asked}: expected a road of at most {longest_km:g} km")
     number = np.arange(count) / parts
     columns = track.elevation_m.reshape(len(track.elevation_m), -1).T
@@ -350,7 +347,7 @@ def motion_along(knots_s: Array, knots_mps: Array, start_m: float, rate_hz: floa
     """
     duration_s = float(knots_s[-1] - knots_s[0])
     count = int(duration_s * rate_hz + 1e-6) + 1
-    longest_s = _MOST_STEPS / max(rate_hz, FINE_RATE_HZ)
+    longest_s = MOST_STEPS / max(rate_hz, FINE_RATE_HZ)
     if count < 2 or duration_s > longest_s:
         raise ValueError(f"expected a drive of {1 / rate_hz:g} to {longest_s:g} s, found {duration_s:g} s")
     time_s = knots_s[0] + np.arange(count) / rate_hz

@@ -8,8 +8,6 @@ file cut neatly between two rows shows too. A part, of a log or of a recording, 
 A stick that logs were exported to is compared with the manifest that lies beside them, and has to have one.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import groupby

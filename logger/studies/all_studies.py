@@ -4,8 +4,6 @@ Each process has one study at a time and one thread of linear algebra, so that t
 over.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 from collections.abc import Iterator, Sequence

@@ -13,8 +13,6 @@ The dissertation's way of fitting is output error: what the model leaves is take
 innovations form: of white noise, autoregressive noise and a road that the profile does not contain, the likeliest.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
@@ -67,7 +65,7 @@ class Conditions:
     iri_m_per_km: float = 0.0
     seed: int = 0
 
-    def on(self, iri_m_per_km: float, seed: int) -> Conditions:
+    def on(self, iri_m_per_km: float, seed: int) -> "Conditions":
         """The same sensor on another road; another seed, another noise and road."""
         return replace(self, iri_m_per_km=iri_m_per_km, seed=seed)
 

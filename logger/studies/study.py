@@ -10,8 +10,6 @@ The word of a printed item is computed from its checks: a misprint first, then w
 better, then what agrees. An item without any check is not reproducible.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -26,6 +24,7 @@ import numpy as np
 from drivers.catalogue import names
 from logger.chart_data import Chart
 from logger.errors import BadInput
+from logger.question import silent
 
 
 class Word(StrEnum):
@@ -147,10 +146,6 @@ of public records of roads."""
 DISSERTATION = "N. Blum, dissertation, University of Maryland, 2015"
 
 
-def _silent(_done: int, _of: int) -> None:
-    pass
-
-
 @dataclass(frozen=True)
 class Workload:
     """How much work to spend, and whom to tell how much of it is done.
@@ -162,7 +157,7 @@ class Workload:
     """
 
     share: float = 1.0
-    progress: Callable[[int, int], None] = _silent
+    progress: Callable[[int, int], None] = silent
     folder: Path | None = None
     vehicle: str | None = None
 

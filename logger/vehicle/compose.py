@@ -6,8 +6,6 @@ matrices, laws of the corners, the sensor's row and what lies behind it. ``respo
 car whose laws are all linear is stepped in blocks; only one with other laws goes through the loop.
 """
 
-from __future__ import annotations
-
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache, partial
@@ -95,7 +93,7 @@ class Car:
         return self.body, *map(_key, self.sensors), *map(_key, self.records)
 
     @property
-    def linear(self) -> Car:
+    def linear(self) -> "Car":
         """The car without its laws, which its numbers have as well."""
         return replace(self, laws=(), bends_laws=False, body=(self.body[0], ()))
 

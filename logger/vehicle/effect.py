@@ -18,8 +18,6 @@ They are applied in this order, and within a kind in the order of ``stage``, so 
 names them does not matter. An effect changes nothing in place.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -236,7 +234,7 @@ class Effect(ABC):
     also_by: tuple[str, ...] = ()
     stage: int = 0
     refinements: tuple[str, ...] = ()
-    variants: Mapping[str, Effect] = MappingProxyType({})
+    variants: "Mapping[str, Effect]" = MappingProxyType({})
 
     def __init_subclass__(cls) -> None:
         folder, _, file = cls.__module__.rpartition(".")
@@ -248,7 +246,7 @@ class Effect(ABC):
         """All its parameters as they are when nothing is said of them: at their defaults, or else at their starts."""
         return {one.name: one.start if one.default is None else one.default for one in self.parameters}
 
-    def on(self, vehicle: Vehicle) -> Effect:
+    def on(self, vehicle: Vehicle) -> "Effect":
         """The effect as this vehicle can have it."""
         return self.variants.get(vehicle.model, self)
 
@@ -464,7 +462,7 @@ class Chosen:
         """In words the one axle that it acts at; empty: at all that there are."""
         return ("", "front axle alone", "rear axle alone")[int(self.values.get(AXLE.name, 0))]
 
-    def is_shaped_as(self, other: Chosen) -> bool:
+    def is_shaped_as(self, other: "Chosen") -> bool:
         """Whether another is the same effect with the same frequencies, knees and choices, whatever its strength."""
         return self.effect is other.effect and all(
             self.values[one.name] == other.values[one.name] for one in self.effect.parameters

@@ -20,8 +20,6 @@ drawn from their joint normal distribution, which are the same as above (for Bou
 Source: J. B. Roberts, P. D. Spanos, Random Vibration and Statistical Linearization (1990), chapters 2 and 5.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from functools import cache

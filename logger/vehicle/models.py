@@ -10,8 +10,6 @@ the two suspensions of the axle do against each other. With x the extension of a
 axle rolls against the body by (x_left - x_right) / b, and the bar stores 1/2 k ((x_left - x_right) / b)^2.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 from functools import lru_cache
 

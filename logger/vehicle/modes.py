@@ -6,8 +6,6 @@ computed), all coupled but without dampers (the eigenvalue analysis of its 4.3.3
 dampers. Each is one function here, so that a number can be set beside its like.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

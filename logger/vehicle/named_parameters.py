@@ -1,7 +1,5 @@
 """The numbers of a car and of its effects by name: how a fit moves them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -91,7 +89,7 @@ class Free:
         return self.weakest if self.usual is None else self.weakest * max(1.0, abs(value) / self.usual)
 
 
-    def as_strength(self) -> Free:
+    def as_strength(self) -> "Free":
         """The same number down to 0, which moves by differences; an error within its bounds is an estimate."""
         return replace(self, low=0.0, usual=self.start, weakest=self.weakest * self.high / self.start)
 

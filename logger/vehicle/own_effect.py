@@ -6,8 +6,6 @@ about something else. Solution: it is looked through when it is read, and tried 
 of its, those of the laws that it gives too, is looked at. What is wrong is raised where the user's file can be blamed.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import AbstractContextManager
 from copy import copy

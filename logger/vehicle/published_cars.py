@@ -10,8 +10,6 @@ A. Gelman et al., Bayesian Data Analysis, 3rd ed., 3.2), as few cars are publish
 and what sets them apart are counted on their own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache

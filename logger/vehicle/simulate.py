@@ -1,7 +1,5 @@
 """The passage of a car over a road, or on a rig: what comes under its wheels, and what a recorder keeps of it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Hashable
 from copy import copy
 from functools import lru_cache
@@ -138,14 +136,14 @@ class Passage:
         """How fast the car is at the samples (N,) [m/s]."""
         return np.asarray(np.gradient(self.distance_m, 1 / self.rate_hz))
 
-    def cut(self, count: int) -> Passage:
+    def cut(self, count: int) -> "Passage":
         """Its first samples."""
         if (found := self._cuts.get(count)) is None:
             found = self._cuts[count] = Passage(self.track, self.rate_hz, self.distance_m[:count], 1 / self.step_s,
                                                 self._way.run, self._mirrored > 0, self._of_bench)
         return found
 
-    def begun_with(self, state: Array) -> Passage:
+    def begun_with(self, state: Array) -> "Passage":
         """The same passage begun in a state that differs by this (2 n + k,) from the one at rest, as ``begins``."""
         found = copy(self)
         found.begins, found._bodies = state, {}

@@ -14,8 +14,6 @@ state that decays towards something, however quickly (M. Hochbruck, A. Ostermann
 19, 2010, 2.3).
 """
 
-from __future__ import annotations
-
 from collections import namedtuple
 from collections.abc import Callable
 from functools import cache

@@ -21,8 +21,6 @@ Stepping sample by sample in Python is slow; but a stretch of steps can be taken
 and only the state at the end of each has to be carried on.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache

@@ -1,7 +1,5 @@
 """What a car is to the models: masses, springs, dampers and places, as numbers and nothing else."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 GENERIC = "generic"

@@ -6,8 +6,6 @@ Layout of a segment (README of github.com/commaai/comma2k19): NumPy arrays ``t``
 [m/s]. There is no profiler: what comes out is rows and a map, and the speeds beside each other.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

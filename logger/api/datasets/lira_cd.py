@@ -8,8 +8,6 @@ longitude), ``spd_veh`` [km/h]. ``cph1_iri_mpd_rut_hh.csv``: IRI of the left and
 another profiler, ARAN, with places. HH and VH are the two carriageways: two roads.
 """
 
-from __future__ import annotations
-
 import re
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,7 +17,7 @@ import numpy as np
 
 from logger.api import data_sets
 from logger.arrays import Array
-from logger.errors import BadInput
+from logger.errors import BadInput, as_bad_input
 from logger.extraction.along_track import ASIDE_M, MeasuredLine
 from logger.files import read_bounded
 from logger.roads.repeated_drives import best_shift_m, matching_cells, mean_between
@@ -159,10 +157,8 @@ def _line(path: Path, at_m: Array, lat_deg: Array, lon_deg: Array) -> MeasuredLi
     at_m, lat_deg, lon_deg = at_m[known], lat_deg[known], lon_deg[known]
     cell = np.floor(at_m / _PLACE_EVERY_M)
     kept = np.unique(cell, return_index=True)[1]
-    try:
+    with as_bad_input(path):
         return MeasuredLine.of(at_m[kept], lat_deg[kept], lon_deg[kept])
-    except ValueError as error:
-        raise BadInput(f"{path}: {error}") from None
 
 
 def _aran(path: Path, line: MeasuredLine) -> tuple[Array, Array]:

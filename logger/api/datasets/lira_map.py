@@ -5,8 +5,6 @@ is a list of ``{"pos": {"lat", "lng"}, "timestamp": metres from the start, "valu
 not said there; it is inferred from names and content.
 """
 
-from __future__ import annotations
-
 import gzip
 import json
 import zlib

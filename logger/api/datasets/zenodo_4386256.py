@@ -6,8 +6,6 @@ Layout as a reader of the set has it (github.com/JMMA84/DIMMIT-V1; names alone w
 ``road_elevation_concord.mat``: the same of Route 2. ``geopoint_*.mat``: the places of those, evenly spread.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory

@@ -4,8 +4,6 @@ The answer, and a fit on measured roads or without one in plain words and for a 
 whether to believe it; as pictures its residuals, and which numbers can be estimated only together.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
@@ -24,7 +22,7 @@ from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, check_forces, model_of
 from logger.chart_data import Array, Bars, Chart, Curves, Line
 from logger.dsp.filters import DecimatingLowPass
-from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput, CheckFailed
+from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput, CheckFailed, as_bad_input
 from logger.fitting.information_matrix import correlation_of
 from logger.identification.drive_model import DriveModel
 from logger.identification.identifiability import NotIdentifiable
@@ -86,6 +84,10 @@ class Identification(CommandResult):
     fit            with covariance and correlation, of measured roads with the whitened residuals as well
     model          with the numbers
     cannot_tell    sentences that stand between the numbers and their being believed; empty: none
+    parameters     by name, and their ``standard_errors``
+    error_before   rms(measured - model) / rms(measured) with every free number where it started, ``error_after`` with
+                   those found
+    converged      whether the fit came to rest; if not, do not use the numbers
     """
 
     title: ClassVar[str] = "Fitted parameters"
@@ -93,31 +95,11 @@ class Identification(CommandResult):
     fit: Fit | RoadFit
     model: Model
     cannot_tell: tuple[str, ...]
-
-    @property
-    def parameters(self) -> Mapping[str, float]:
-        """By name."""
-        return self.fit.parameters
-
-    @property
-    def standard_errors(self) -> Mapping[str, float]:
-        """By name."""
-        return self.fit.standard_errors
-
-    @property
-    def error_before(self) -> float:
-        """rms(measured - model) / rms(measured) with every free number where it started."""
-        return self.fit.error_before
-
-    @property
-    def error_after(self) -> float:
-        """The same with those found."""
-        return self.fit.error_after
-
-    @property
-    def converged(self) -> bool:
-        """Whether the fit came to rest; if not, do not use the numbers."""
-        return self.fit.converged
+    parameters: Mapping[str, float]
+    standard_errors: Mapping[str, float]
+    error_before: float
+    error_after: float
+    converged: bool
 
     @property
     def exit_status(self) -> int:
@@ -249,7 +231,8 @@ def _identification(records: Sequence[Record], fit: Fit | RoadFit, free: Sequenc
     return Identification(
         Blocks([Lines([*first]), _table(fit, free), Lines([*lines]), Lines(left_out)]),
         {**summary, "runs": [record.name for record in records], **left_out_json(runs_left_out(records))},
-        fit, model_of(model), tuple(cannot_tell))
+        fit, model_of(model), tuple(cannot_tell), fit.parameters, fit.standard_errors, fit.error_before,
+        fit.error_after, fit.converged)
 
 
 def _with_unknown_numbers(given: vehicle_file.CarModel, word: str, question: IdentifyQuestion) -> IdentifyQuestion:
@@ -417,10 +400,8 @@ def _on_unmeasured_roads(given: Model, records: list[Record], question: Identify
     if given.effects:
         raise BadInput(f"{word_of(question.vehicle, given)}: expected a car without effects where the road was not "
                        f"measured, found {', '.join(one.effect.name for one in given.effects)}")
-    try:
+    with as_bad_input():
         drives = drives_of(records)
-    except ValueError as error:
-        raise BadInput(str(error)) from None
     parameters = _free(given, RoadInput(), {}, records, question)
     try:
         car = AxleResponse(given.vehicle, parameters, drives[0].rate_hz)

@@ -5,10 +5,8 @@ which may not fit each other; a search takes minutes, and what is wrong has to b
 ``bench_of`` checks all of it once, and its methods are the questions that can be asked.
 """
 
-from __future__ import annotations
-
-from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from contextlib import AbstractContextManager
 from copy import copy
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -24,7 +22,7 @@ from logger.api.lab.question import LabQuestion
 from logger.api.shared_fields import Runs, each
 from logger.api.vehicles import model_of
 from logger.arrays import Array
-from logger.errors import BadInput
+from logger.errors import BadInput, as_bad_input
 from logger.lab.compare import LabComparison, compare
 from logger.lab.diagnosis import LabDiagnosis, begin_search, diagnose
 from logger.lab.likelihood.posterior import Posterior, State
@@ -140,14 +138,12 @@ class Bench:
         effect, file = self.named(name)
         if effect.name in [one.effect.name for one in self.model.effects]:
             raise BadInput(f"{self.word}: expected a vehicle without {effect.name}, which it has")
-        try:
+        with as_bad_input(said):
             whole = effect.checked({**effect.usual, **values})
-        except ValueError as error:
-            raise BadInput(f"{said}: {error}") from None
         self.try_out(chosen(effect, whole, file=file))
         return effect, file
 
-    def with_effect(self, effect: Effect, file: str | None) -> Bench:
+    def with_effect(self, effect: Effect, file: str | None) -> "Bench":
         """The same where this effect is known, too."""
         return replace(self, effects={**self.effects, effect.name: effect},
                        files={**self.files, effect.name: file} if file is not None else self.files)
@@ -166,7 +162,7 @@ class Bench:
                                                  if one.choices and one.name in values})
         return chosen(effect, {**best.effects[-1].values, **values}), best.state
 
-    def beside(self, starts: Sequence[Chosen]) -> Bench:
+    def beside(self, starts: Sequence[Chosen]) -> "Bench":
         """The same with effects in the model that are about to be added."""
         return replace(self, model=replace(self.model, effects=(*self.model.effects, *starts)))
 
@@ -191,13 +187,9 @@ class Bench:
         return CarModel(found.vehicle, found.effects, (*history, step),
                         self.model.given or self.model.vehicle, found.errors, self.model.known)
 
-    @contextmanager
-    def blamed(self) -> Iterator[None]:
+    def blamed(self) -> AbstractContextManager[None]:
         """What is wrong with the vehicle names it."""
-        try:
-            yield
-        except ValueError as error:
-            raise BadInput(f"{self.word}: {error}") from None
+        return as_bad_input(self.word)
 
 
 def bench_of(word: str, model: CarModel, runs: SimulatedRuns, effect_files: Sequence[str],
@@ -356,11 +348,9 @@ def _in_their_bands(runs: SimulatedRuns, predictions: Sequence[Array], low_pass_
     if low_pass_hz is not None and not 0 < low_pass_hz < half_hz:
         raise WrongOption(f"`low_pass_hz` {low_pass_hz:g}: expected above 0 and below {half_hz:g} Hz, half the "
                           "sample rate")
-    try:
+    with as_bad_input():
         found = with_pass_bands(runs.runs, [run.main(one) for run, one in zip(runs.runs, predictions, strict=True)],
                                 low_pass_hz)
-    except ValueError as error:
-        raise BadInput(str(error)) from None
     same = all(one.low_pass is None and one.facts.pass_band_hz is None for one in found)
     return runs if same else SimulatedRuns(found, runs.fine_hz)
 

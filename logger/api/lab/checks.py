@@ -3,8 +3,6 @@
 Runs are checked by themselves and with each other, then the model against them: units, ways up, roads, another car.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -20,7 +18,8 @@ from logger.bounds import SPEED, time_hint
 from logger.dsp.channel_faults import at_ends, goes_against, longest_still
 from logger.dsp.repeated_samples import find_repeats, stretches_of
 from logger.dsp.whole_record import thinned
-from logger.errors import BadInput
+from logger.errors import BadInput, as_bad_input
+from logger.estimation.batch import BACK_M
 from logger.lab.another_car import LikeliestRig, another_car, error_with_best_effect, likeliest_rig
 from logger.lab.likelihood.lag import SLOWEST_MPS
 from logger.lab.likelihood.priors import Tolerance
@@ -141,10 +140,8 @@ def check_roads(word: str, model: CarModel, runs: SimulatedRuns, warn: Callable[
 
 def predicted(word: str, model: CarModel, runs: SimulatedRuns, effects: Sequence[Chosen]) -> list[Array]:
     """What the car with these effects would have recorded. BadInput where it shakes itself to pieces."""
-    try:
+    with as_bad_input(word):
         predictions = runs.predict(compose(model.vehicle, effects))
-    except ValueError as error:
-        raise BadInput(f"{word}: {error}") from None
     if not bounded(predictions):
         names = " and ".join(one.effect.name for one in effects)
         raise BadInput(f"{word}: with {names} the model is unstable: its motion grows without bound")
@@ -354,7 +351,6 @@ _LEAST_PERIODS = 3.0  # of what swings freely: fewer leave its damping to chance
 _LEAST_RATE_HZ, _CLOCK = 50.0, 0.01
 _MOST_MEAN_MPS2 = 2.0
 _RUN_CHECKS_LEAST_MPS2 = 1e-5  # no sensor is so quiet
-_BACK_M = 1.0  # a distance that was set right may fall, or leap, so far
 _DISAGREE, _DISAGREE_M = 0.5, 5.0
 
 
@@ -422,8 +418,8 @@ def check_distances(drive: Drive) -> None:
     """Raise BadInput for distances that are none: they fall, leap, or have nothing to do with the speed."""
     distance_m = drive.distance_m
     for wrong, words in (
-        (np.diff(distance_m) > SPEED.largest / drive.rate_hz + _BACK_M, "that grow steadily"),
-        (np.maximum.accumulate(distance_m)[:-1] - distance_m[1:] > _BACK_M, "that grow, as the car drives forward"),
+        (np.diff(distance_m) > SPEED.largest / drive.rate_hz + BACK_M, "that grow steadily"),
+        (np.maximum.accumulate(distance_m)[:-1] - distance_m[1:] > BACK_M, "that grow, as the car drives forward"),
     ):
         if wrong.any():
             at = int(np.argmax(wrong))

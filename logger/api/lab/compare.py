@@ -3,8 +3,6 @@
 ``Comparison`` and ``AddedEffect`` are what Python gets. A page opens with no network and runs no script.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -50,6 +48,9 @@ class Comparison(CommandResult):
     refitted_error   with its numbers and the distances refitted within their tolerance
     run_errors       by name of the run, as the model stands
     evidence         sentences
+    missing          whether the residual depends on the road and the car's motion
+    shifts           by which share each number moved for the refit; ``shifted_far``: those that moved farther than
+                     their tolerance
     """
 
     found: LabComparison
@@ -57,21 +58,9 @@ class Comparison(CommandResult):
     refitted_error: float
     run_errors: Mapping[str, float]
     evidence: tuple[str, ...]
-
-    @property
-    def missing(self) -> bool:
-        """Whether the residual depends on the road and the car's motion."""
-        return self.found.missing
-
-    @property
-    def shifts(self) -> Mapping[str, float]:
-        """By which share each number moved for the refit."""
-        return self.found.moves
-
-    @property
-    def shifted_far(self) -> tuple[str, ...]:
-        """Numbers that moved farther than their tolerance."""
-        return self.found.far
+    missing: bool
+    shifts: Mapping[str, float]
+    shifted_far: tuple[str, ...]
 
     def charts(self) -> Sequence[Chart]:
         """Spectra of measurement, model and residual after the refit."""
@@ -91,7 +80,8 @@ def comparison_of(found: LabComparison) -> Comparison:
     """What the lab found, as it is shown."""
     summary = comparison_json(found)
     return Comparison(Blocks(comparison_blocks(found)), summary, found, found.plain.error, found.steps[-1].error,
-                      {one["run"]: one["error"] for one in summary["runs"]}, tuple(summary["evidence"]))
+                      {one["run"]: one["error"] for one in summary["runs"]}, tuple(summary["evidence"]), found.missing,
+                      found.moves, found.far)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -380,7 +370,7 @@ def _whole_drives(residuals: ModelResiduals) -> Detail:
     return Detail("Each run", drawn)
 
 
-def moment_chart(title: str, residuals: ModelResiduals, at: Moment, signals: Mapping[str, Sequence[Array]]) -> Curves:
+def moment_chart(title: str, residuals: ModelResiduals, at: "Moment", signals: Mapping[str, Sequence[Array]]) -> Curves:
     """Signals of the runs, by name and (n,) each, at a moment."""
     run = residuals.runs[at.run]
     time_s = (run.first + np.arange(len(residuals.residual[at.run])))[at.part] / residuals.rate_hz

@@ -4,8 +4,6 @@ The answers, their words for a person and for a program, and the page: what is m
 shape of what no effect explains.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path

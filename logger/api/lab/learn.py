@@ -3,8 +3,6 @@
 The page has what the law is, its picture, what it brings, and what it may be instead.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial

@@ -3,8 +3,6 @@
 The steps, the story of them in words and for a program, and its page; beside it the page of ``demo --field``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, replace
@@ -30,7 +28,7 @@ from logger.lab.likelihood.posterior import State
 from logger.lab.residuals.breakdown import ModelResiduals, frequencies
 from logger.lab.selection.add_effect import AddedEffects, ShiftedNumber, moved_between
 from logger.lab.selection.holdout import JUDGED_ON
-from logger.question import Notify, function
+from logger.question import Notify, function, silent
 from logger.report import document as doc
 from logger.report.blocks import SHOWN_ROWS, Block, Blocks, Bullets, Hint, Section, Table, page, text
 from logger.report.charts import chart
@@ -148,7 +146,7 @@ def lab(question: LabLoopQuestion) -> LabStory:
     place, bench = Path(question.out), bench_with(question, None if question.candidates is not None else "ridelog lab")
     bench = with_candidates(bench, question.candidates)
     make_ready(bench, place)
-    return walk(bench, place, _asking(question.ask), unsaid_lines, lambda: nullcontext(question.progress),
+    return walk(bench, place, _asking(question.ask), silent, lambda: nullcontext(question.progress),
                 learns=lambda: question.learns)
 
 
@@ -164,10 +162,6 @@ def _asking(ask: Callable[[str], str | None]) -> Ask:
     return wanted
 
 
-def unsaid_lines(_lines: Iterable[str]) -> None:
-    """Drop the lines: a loop that prints nothing."""
-
-
 def make_ready(given: Bench, out: Path, option: str = "") -> None:
     """Make the folder for the files. BadInput where there cannot be one, and for files that are read, or cannot be
     written; ``option``: how the folder was asked for."""
@@ -179,13 +173,8 @@ def make_ready(given: Bench, out: Path, option: str = "") -> None:
         check_out(file, [Path(run.name) for run in given.runs.runs], given.files_read, option)
 
 
-def always() -> bool:
-    """A law is to be learned."""
-    return True
-
-
 def walk(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progress, explain: Explain = lambda *_: "",
-         learns: Learns = always) -> LabStory:
+         learns: Learns = lambda: True) -> LabStory:
     """Go through the loop; write the vehicle files and the page into ``out``.
 
     learns      asked once, where no effect explains what is missing
@@ -210,7 +199,7 @@ def walk(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progress, exp
 
 
 def go_through(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progress, explain: Explain,
-               learns: Learns = always) -> tuple[Story, vehicle_format.CarModel]:
+               learns: Learns = lambda: True) -> tuple[Story, vehicle_format.CarModel]:
     """The same without its end and its page."""
     word = given.word
     notify(chapter("Compare", explain("compare", "", word)))
@@ -225,7 +214,8 @@ def go_through(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progres
     while going and len(rounds) < MOST_ROUNDS:
         going = False
         notify(chapter("Diagnose", explain("diagnose", "", word)))
-        diagnoses.append(_diagnosed(step.given, frozenset(refused), progress))
+        with progress() as tell:
+            diagnoses.append(step.given.diagnosed(tell, frozenset(refused)))
         notify([text(diagnosing.diagnosis_blocks(diagnoses[-1], SHOWN_ROWS))])
         if diagnoses[-1].exceeds_noise and asked:
             asked = False
@@ -264,7 +254,7 @@ class _Step:
     progress: Progress
     explain: Explain
 
-    def added(self, name: str, start: _Begin | None, number: int) -> tuple[_Step, Round]:
+    def added(self, name: str, start: _Begin | None, number: int) -> "tuple[_Step, Round]":
         """An effect added: from where a diagnosis found it, or from where a search for it ends (None)."""
         file = _vehicle_file(self.out, number)
         self.notify(chapter(f"Add {name}", self.explain("add", name, str(file))))
@@ -273,7 +263,7 @@ class _Step:
             addition = self.given.added([begin], len(begin.effect.trials()), notify, near)
         return self._with(addition, name, file)
 
-    def learned(self) -> tuple[_Step, learning.LearnedModel, list[Round]]:
+    def learned(self) -> "tuple[_Step, learning.LearnedModel, list[Round]]":
         """A law learned, written and added, with what is missing beside it; or none."""
         file = self.out / LAW
         self.notify(chapter("Learn a law", self.explain("learn", "", str(file))))
@@ -291,7 +281,7 @@ class _Step:
         step, made = replace(self, given=knows)._with(addition, name, vehicle)
         return step, found, [made]
 
-    def _with(self, addition: AddedEffects, name: str, file: Path) -> tuple[_Step, Round]:
+    def _with(self, addition: AddedEffects, name: str, file: Path) -> "tuple[_Step, Round]":
         """The vehicle with what was added written and compared."""
         model = self.given.model_with(addition)
         vehicle_format.write_model(file, model)
@@ -305,11 +295,6 @@ class _Step:
 
 def _vehicle_file(out: Path, number: int) -> Path:
     return out / f"vehicle-{number}.yaml"
-
-
-def _diagnosed(given: Bench, left_out: frozenset[str], progress: Progress) -> diagnosis.LabDiagnosis:
-    with progress() as notify:
-        return given.diagnosed(notify, left_out)
 
 
 def _compared(given: Bench, progress: Progress) -> compare.LabComparison:

@@ -3,8 +3,6 @@
 The answer, its words for a person and for a program, and the page with numbers of pairs as shaded cells.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from math import log

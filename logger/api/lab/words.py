@@ -1,8 +1,6 @@
 """What the lab's answers share: errors on one scale, what is taken out of an error before anything is judged, which
 frequencies were compared, and what a residual looks like; in sentences, as rows, in pictures and for a program."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -4,8 +4,6 @@ A. Janot, M. Gautier, M. Brunot, Data Set and Reference Models of EMPS, 2019 Wor
 Benchmarks. Their model: M q'' + Fv q' + Fc sign(q') + offset = force, by inverse dynamics and least squares.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

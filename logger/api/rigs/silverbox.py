@@ -6,8 +6,6 @@ European Control Conference 2013. Volts in and volts out stand for newtons and m
 arrow, samples 100 to 40575, a filtered noise that grows beyond what the fit has seen from its sample 32000 on.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

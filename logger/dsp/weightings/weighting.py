@@ -8,8 +8,6 @@ itself, through its Fourier transform. A stream needs sections: fitted to the fo
 ``logger.dsp.design``; those of the rate the service runs at are stored beside the formula and checked against it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -1,8 +1,6 @@
 """Comma-separated values (RFC 4180), for spreadsheets and scripts: a header and a line a row, empty where nothing is
 known."""
 
-from __future__ import annotations
-
 import csv
 from collections.abc import Iterator
 from io import StringIO

@@ -1,7 +1,5 @@
 """GeoJSON (RFC 7946): a feature a row, WGS 84, six decimals of a degree (0.1 m), lines cut at the 180th meridian."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from typing import Any

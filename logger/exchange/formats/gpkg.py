@@ -1,7 +1,5 @@
 """GeoPackage (OGC 12-128), the file of QGIS and most GIS programs, written by GDAL through pyogrio."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from io import BytesIO
 

@@ -4,8 +4,6 @@ go to are waypoints.
 A point's time is that of the row's middle, where the point lies.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from itertools import groupby
 from xml.sax.saxutils import escape

@@ -1,8 +1,6 @@
 """KML 2.2 (OGC 07-147r2), for Google Earth: a folder a drive, a line a row in the colour of its class, its values in a
 balloon."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from itertools import groupby
 from xml.sax.saxutils import escape

@@ -1,7 +1,5 @@
 """GeoParquet 1.1: Apache Parquet whose geometry column says what it is, for pandas, DuckDB, Spark and GIS programs."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator
 from io import BytesIO

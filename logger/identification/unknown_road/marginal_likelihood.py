@@ -25,8 +25,6 @@ The prior of a road is that of ISO 8608, Gd(n0) (n / n0)^-w, flat below the long
 pivot where a car is shaken, so that level and waviness can be separated.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
@@ -205,7 +203,7 @@ class UnknownRoad:
                               model.responses[number], self.grid.wave_number_cpm, model.waves[0], white,
                               self._options.place_off_m, self._options.scale_off)
 
-    def with_cars(self, cars: Sequence[ResponseCar]) -> UnknownRoad:
+    def with_cars(self, cars: Sequence[ResponseCar]) -> "UnknownRoad":
         """The same road and drives with another car, whose axles stand where they stood; one for each drive, of the
         same numbers, as a car that is not linear answers each drive in its own way."""
         other = copy(self)
@@ -404,7 +402,7 @@ class Roads:
         """Indices of the places of a road's drives but the first."""
         return self.parts[road][self.are(OFFSET)[self.parts[road]]]
 
-    def with_cars(self, cars: Sequence[ResponseCar]) -> Roads:
+    def with_cars(self, cars: Sequence[ResponseCar]) -> "Roads":
         """The same with another car, whose axles stand where they stood, in each drive over each road."""
         other, cars = copy(self), list(cars)
         other.roads = []
@@ -414,7 +412,7 @@ class Roads:
             cars = cars[count:]
         return other
 
-    def prepared(self, values: Array, numbers: Array) -> Roads:
+    def prepared(self, values: Array, numbers: Array) -> "Roads":
         """The same, whose equations are solved in few rounds near these values of the car's and the roads' numbers."""
         other = copy(self)
         other.roads = [copy(road) for road in self.roads]

@@ -1,7 +1,5 @@
 """A car's free numbers from drives over roads that nobody measured: the fit, from start to verdict."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

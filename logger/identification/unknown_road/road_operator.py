@@ -10,8 +10,6 @@ conjugate gradients. B is never formed: a drive is applied to a road, and back, 
 drives were endless and their speeds even, or by a factor of the matrix itself, taken nearby.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
@@ -22,14 +20,13 @@ from scipy.fft import irfft, rfft
 
 from logger.arrays import Array, Complex
 from logger.dsp.whole_record import SEEN_OF_RATE
-from logger.estimation.road_solver import patch_gain
+from logger.estimation.car_response import SPEEDS_PER_E
+from logger.estimation.road_solver import MARGIN_M, patch_gain
 from logger.runs import SLOWEST_MPS
 from logger.vehicle.simulate import smooth_length
 
 _SWELL_S, _APPROACH_S, _TAIL_S, _REST_S = 2.0, 3.0, 1.0, 2.0
 _FAST_SHARE = 0.99
-_SPEED_STEPS_PER_E = 20
-_MARGIN_M = 5.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +62,7 @@ def grid_under(drives: list[RoadDrive], behind_m: Array, spacing_m: float, most_
     """A grid that holds the way of all drives, from where they came to where they went on, were their places so much
     off and their distances longer by such a share."""
     ways = [_way(drive)[0] for drive in drives]
-    off_m = most_off_m + scale_off * max(float(np.ptp(way)) for way in ways) + _MARGIN_M
+    off_m = most_off_m + scale_off * max(float(np.ptp(way)) for way in ways) + MARGIN_M
     first_m = min(float(way.min()) for way in ways) - float(behind_m.max()) - off_m
     last_m = max(float(way.max()) for way in ways) + off_m
     return Grid(first_m, spacing_m, smooth_length(int((last_m - first_m) / spacing_m) + 2))
@@ -94,7 +91,7 @@ class Crossing:
         self._averaged = np.where(n <= self.seen_cpm, patch_gain(n, contact_patch_m, grid.spacing_m), 0.0)
         self._lay(1.0)
 
-    def laid(self, scale: float) -> Crossing:
+    def laid(self, scale: float) -> "Crossing":
         """The same drive, its distances from its middle so many times what was recorded."""
         if scale == self._scale:
             return self
@@ -169,10 +166,10 @@ class Crossing:
         """Sum over the samples (k,) of the squared gain from road to reading for waves of the grid."""
         n = self._grid.wave_number_cpm
         axle = np.exp(-2j * np.pi * n * behind_m[:, None])
-        steps = np.round(np.log(self.speed_mps) * _SPEED_STEPS_PER_E)
+        steps = np.round(np.log(self.speed_mps) * SPEEDS_PER_E)
         total = np.zeros(len(n))
         for step, samples in zip(*np.unique(steps, return_counts=True), strict=True):
-            at_hz = n * np.exp(step / _SPEED_STEPS_PER_E)
+            at_hz = n * np.exp(step / SPEEDS_PER_E)
             gain = sum(np.interp(at_hz, self.f_hz, one) * delay for one, delay in zip(response, axle, strict=True))
             total += samples * np.abs(gain) ** 2
         return np.asarray(total * self._averaged**2 * np.sinc(n * self._grid.spacing_m) ** 4)
@@ -268,7 +265,7 @@ class DrivesModel:
     spectral: Array
     variance: float
 
-    def of(self, drives: Sequence[int]) -> DrivesModel:
+    def of(self, drives: Sequence[int]) -> "DrivesModel":
         """Some of the drives."""
         return DrivesModel([self.crossings[one] for one in drives], [self.waves[one] for one in drives],
                            [self.responses[one] for one in drives], [self.derivatives[one] for one in drives],

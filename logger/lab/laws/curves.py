@@ -6,8 +6,6 @@ the runs' motions lie, monotone between them (F. N. Fritsch and J. Butland, SIAM
 each of them counts. Beyond the motions of the runs curves stay what they are there: nothing is known of them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 

@@ -9,8 +9,6 @@ A family is one file that offers ``FAMILY``: in the field's words what it is, th
 what the runs show of the car's motions, and the sentence with numbers for one that was found.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -58,7 +56,7 @@ class Draft:
     words        the other lines of its class (``needs_road = True``)
     """
 
-    family: Family
+    family: "Family"
     kind: str
     title: str
     parameters: tuple[Parameter, ...]

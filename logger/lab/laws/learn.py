@@ -17,8 +17,6 @@ band that is compared or a number at an end of its range, where it is the straig
 already, and where a known effect explains more in its place.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 

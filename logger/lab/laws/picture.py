@@ -1,7 +1,5 @@
 """A learned law as a curve with its band over the motions that the runs had, or as the loop that a memory makes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from types import SimpleNamespace
 

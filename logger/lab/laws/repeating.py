@@ -9,8 +9,6 @@ own, and all of them are counted as parameters. A model with such a law, compare
 first, the second, ... of those: its error there is that of a refit.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

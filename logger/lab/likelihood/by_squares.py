@@ -6,8 +6,6 @@ only from their minimum the likelihood goes on. Their level is free, so that pri
 were the noise as large as all that was measured, a damper known to a factor of two would stay at what its file says.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from functools import cached_property
 
@@ -41,7 +39,7 @@ class BySquares:
         self.whiteners = self._whiteners(1.0)
 
     @classmethod
-    def of(cls, posterior: Posterior) -> BySquares:
+    def of(cls, posterior: Posterior) -> "BySquares":
         """Those over the runs of a posterior."""
         runs, kept = posterior.runs.runs, list[int]()
         for index, run in enumerate(runs):
@@ -96,7 +94,7 @@ class BySquares:
         return found if np.isfinite(found[0]) else None
 
     @cached_property
-    def _loudest(self) -> BySquares:
+    def _loudest(self) -> "BySquares":
         loudest = max(self.kept, key=lambda one: float(self.whole.runs.runs[one].kept_mps2.std()))
         return self if len(self.kept) == 1 else BySquares(self.whole, [loudest])
 

@@ -6,8 +6,6 @@ the last one, and around the best one the lag is found between samples, to first
 is a constant time is a clock's, a constant length a position's, and one that grows along the way a wrong speed's.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

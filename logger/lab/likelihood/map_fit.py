@@ -7,8 +7,6 @@ depend on the candidate, so that they are computed once for a model and kept whi
 is judged by a full prediction. Then the model is linearised again at the distances that were found, with new weights.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
@@ -62,7 +60,7 @@ class MapFit:
     score: float
 
     @staticmethod
-    def of(linear: LinearModel) -> MapFit:
+    def of(linear: LinearModel) -> "MapFit":
         """The fitted model that a linear model was linearised at."""
         return MapFit(linear.posterior, linear.state, list(linear.numbers or ()), linear.score)
 

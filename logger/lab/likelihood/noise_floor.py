@@ -8,8 +8,6 @@ remaining band is the first. What runs that repeat each other differ by is noise
 with the motion: what a car does grows with how much it is shaken, what a sensor adds does not.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -6,8 +6,6 @@ much lets mistakes absorb effects. Solution: all of them are nuisance parameters
 numbers on their logarithms.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
@@ -52,7 +50,7 @@ class Tolerance:
     by_name: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, known: Mapping[str, Known]) -> Tolerance:
+    def of(cls, known: Mapping[str, Known]) -> "Tolerance":
         """The usual ones, but for numbers of which the vehicle's file says how well they are known."""
         return cls(by_name={name: one.deviation for name, one in known.items() if name != PRELOAD})
 
@@ -67,7 +65,7 @@ class Tolerance:
             return 0.1 * self.scale
         return self.gain if signal.name == SENSOR else self.scale
 
-    def widened(self) -> Tolerance:
+    def widened(self) -> "Tolerance":
         """Nothing is known of any number of which the file does not say how well it is known."""
         numbers, lengths = (Known.unknown(name, 1.0).deviation for name in ("sprung_mass_kg", "track_width_m"))
         return replace(self, numbers=numbers, lengths=lengths)
@@ -88,7 +86,7 @@ class VehiclePrior:
     steps: Array
 
     @staticmethod
-    def of(vehicle: Vehicle, tolerance: Tolerance) -> VehiclePrior:
+    def of(vehicle: Vehicle, tolerance: Tolerance) -> "VehiclePrior":
         """The prior of a vehicle's numbers."""
         names = sized(vehicle)
         lengths = np.array([name.endswith(("cg_distance_m", "contact_patch_m")) for name in names], dtype=bool)

@@ -16,8 +16,6 @@ ones; under a model that is far off the noise is estimated large, and rounding i
 Clipped and missing samples have residuals as ``Run.residual`` says; derivatives are zero there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -55,7 +53,7 @@ class Readings:
     share: float = 1.0
 
     @staticmethod
-    def of(run: Run) -> Readings:
+    def of(run: Run) -> "Readings":
         """Readings with their rounding taken as noise."""
         return Readings(run, run.measured_mps2)
 
@@ -81,7 +79,7 @@ class Readings:
         reached = (usable == CLIPPED) & (run.residual(run.main(prediction)) == 0)
         return np.concatenate([run.read & ~reached, *(run.read for _ in run.signals)])[: len(prediction)]
 
-    def given(self, prediction: Array) -> Readings:
+    def given(self, prediction: Array) -> "Readings":
         """The readings taken for bounds, given a prediction (n,), or more signals joined to it; with their rounding as
         noise where noise blurs their steps, or they lie on no steps or on one only."""
         prediction, step = self.run.main(prediction), self.run.facts.step_mps2

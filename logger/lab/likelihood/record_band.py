@@ -29,8 +29,6 @@ What a causal filter does below that, a delay that grows towards the cut-off, is
 was found; what one without delay does there is within the tolerance of any recorder (``Tolerance.droop``).
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -191,7 +189,7 @@ def compared_band(runs: Sequence[Run]) -> ComparedBand | None:
                         0 < len(filtered) < len(runs))
 
 
-def _detect_low_pass(fits: Sequence[_Fits], rate_hz: float, common: bool) -> LowPass | None:
+def _detect_low_pass(fits: "Sequence[_Fits]", rate_hz: float, common: bool) -> LowPass | None:
     """The low-pass that some runs went through; None: none. ``common``: they are all the runs of one recorder."""
     plain = sum(one.plain * one.size for one in fits)
     table = sum((one.filtered * one.size for one in fits), np.zeros_like(fits[0].filtered))
@@ -253,7 +251,7 @@ def _window(rate_hz: float) -> int:
     return round(WINDOW_S * rate_hz)
 
 
-def _is_consistent(fits: _Fits, seen: LowPass, rate_hz: float) -> bool:
+def _is_consistent(fits: "_Fits", seen: LowPass, rate_hz: float) -> bool:
     """Whether a run fits no worse with a filter of about this cut-off and order than without."""
     near = np.abs(np.log(_cutoffs_hz(rate_hz) / seen.cutoff_hz)) < _SAME_CUTOFF
     as_steep = np.abs(np.log(_ORDERS / seen.order)) < 2 * _SAME_CUTOFF

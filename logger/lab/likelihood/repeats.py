@@ -8,8 +8,6 @@ No shaker moves twice quite alike; the model predicts what that makes, so that i
 On roads no two drives have the same places and speeds, so that this is known of rigs only.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -10,8 +10,6 @@ The numbers of effects differ by many powers of ten (a cubic stiffness has 1e6, 
 to a diagonal of ones before it is inverted.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 

@@ -3,8 +3,6 @@
 What a file has to offer stands in ``tests.py``. None of them knows an effect.
 """
 
-from __future__ import annotations
-
 from functools import cache
 
 from drivers.catalogue import offers

@@ -1,7 +1,5 @@
 """Does the measurement lag the model, by a constant or by more and more?"""
 
-from __future__ import annotations
-
 import numpy as np
 
 from logger.lab.likelihood.lag import constant_lag, lag_drift

@@ -1,7 +1,5 @@
 """How is the residual distributed, in time, over frequency and in size?"""
 
-from __future__ import annotations
-
 import numpy as np
 
 from logger.dsp.whole_record import HALF_WIDTH_HZ

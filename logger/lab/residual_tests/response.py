@@ -1,7 +1,5 @@
 """Does the car answer the road otherwise than the model, in a linear way or out of proportion?"""
 
-from __future__ import annotations
-
 import numpy as np
 
 from logger.lab.residual_tests.tests import (

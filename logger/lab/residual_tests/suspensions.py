@@ -1,7 +1,5 @@
 """Which force in the suspensions would explain the residual?"""
 
-from __future__ import annotations
-
 from math import ceil, log10
 
 import numpy as np

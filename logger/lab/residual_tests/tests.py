@@ -6,8 +6,6 @@ direction of motion ...), gives a value, its standard error where it has one, an
 noise, and says in a sentence what it found. A test finds something when it is significant and large enough to matter.
 """
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -69,7 +67,7 @@ class ResidualTestResult:
     figures                        what else its sentence says, by name
     """
 
-    test: ResidualTest
+    test: "ResidualTest"
     value: float
     unit: str
     standard_error: float | None

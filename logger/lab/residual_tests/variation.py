@@ -1,7 +1,5 @@
 """Does the residual change with excitation, speed or place?"""
 
-from __future__ import annotations
-
 import numpy as np
 
 from logger.identification.noise_models import LAGS, autocorrelations

@@ -6,8 +6,6 @@ strongly the road excites the car, and the places of each road. Shares are of th
 power of measured - model over all samples that count, so that each list of shares adds up to 1.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property

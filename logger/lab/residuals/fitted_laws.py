@@ -1,7 +1,5 @@
 """The fitted car: by how much its numbers changed, and the force curves of its springs and dampers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

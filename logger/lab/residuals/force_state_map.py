@@ -9,8 +9,6 @@ delay would do is projected out, as a few per cent of those are never physics. B
 autoregressive whitening first, so that coloured noise is not taken for evidence.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -104,7 +102,7 @@ class _Regression:
     whitening: Array
 
     @staticmethod
-    def of(residuals: ModelResiduals) -> _Regression:
+    def of(residuals: ModelResiduals) -> "_Regression":
         """The regression with each linear damper and spring, the gain and a small delay as nuisance columns."""
         wheels = range(residuals.responses[0].rate_mps.shape[1])
         dampers, springs = (_responses_at_sensor(residuals, [_linear_law(wheel, of_rate) for wheel in wheels])

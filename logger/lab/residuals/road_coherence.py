@@ -8,8 +8,6 @@ and a variance from polygamma functions; sums over frequencies are taken as gamm
 variance. Neighbouring frequencies of tapered segments are correlated: every other one counts for the test.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial

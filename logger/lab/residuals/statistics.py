@@ -1,8 +1,6 @@
 """Statistics of residuals: of blocks of them, which count as independent where samples are correlated, and of the
 strongest ordinate of a periodogram."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -32,8 +32,6 @@ relates it to the road, to the car, to a time or to a place, or finds a tone in 
 frequency throughout.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -81,7 +79,7 @@ class Drift:
         """Whether there is one."""
         return self.form != NONE
 
-    def nothing_found(self) -> Drift:
+    def nothing_found(self) -> "Drift":
         """No drift, of the same run."""
         return replace(self, form=NONE, size_mps2=0.0, time_s=None, curve_mps2=np.zeros(len(self.curve_mps2)))
 

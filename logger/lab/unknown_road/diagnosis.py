@@ -6,8 +6,6 @@ are screened by score tests, fitted by Fisher scoring, and are to predict each d
 them. What cannot be identified is computed from the information of these drives, with the road and without it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace

@@ -33,8 +33,6 @@ a model of the car expect there (``lab.likelihood.lag``), and its distances are 
 these are small. A delay of the record moves with them: of such drives it cannot be distinguished from the receiver's.
 """
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from copy import copy
@@ -269,7 +267,7 @@ class SameRoad:
                 for drive, at in enumerate(self._roads.state(road, np.zeros(0), roads)
                                            for road, parts in enumerate(self.stretches) for _ in parts)]
 
-    def moved_as(self, state: RoadFitState) -> SameRoad:
+    def moved_as(self, state: RoadFitState) -> "SameRoad":
         """The problem, its car moved by the roads of a state, and not by those that spectra alone let expect."""
         other = copy(self)
         other.motions = self._moved_by(state.roads)
@@ -288,7 +286,7 @@ class SameRoad:
         """
         return self._roads.with_cars(tables).score(np.zeros(len(tables[0].slopes)), roads, information, fisher_probes)
 
-    def preconditioned(self, state: RoadFitState) -> SameRoad:
+    def preconditioned(self, state: RoadFitState) -> "SameRoad":
         """The problem with preconditioners for models near a state."""
         other = copy(self)
         other._roads = self._roads.with_cars(self.tables(state.gains)).prepared(np.zeros(0), state.roads)

@@ -14,8 +14,6 @@ log is compared: the words with the figure of their own row, numbers that count 
 by in the middle.
 """
 
-from __future__ import annotations
-
 from bisect import bisect_left
 from collections import defaultdict
 from collections.abc import Callable, Sequence

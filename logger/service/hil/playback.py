@@ -10,8 +10,6 @@ microcontroller would send them, as lines ``x,y,z`` in g (profile ``lines``); no
 that it lies at the end of the range. The expected rows are made of the same lines.
 """
 
-from __future__ import annotations
-
 from array import array
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
@@ -27,7 +25,7 @@ from drivers.dump import LATEST_US, DumpHeader, Event
 from drivers.errors import BadReply, NotPresent, SettingsError
 from drivers.hardware import BytePort
 from drivers.readings import AccelerationBlock, RecordedWords
-from logger.errors import BadInput
+from logger.errors import BadInput, as_bad_input
 from logger.estimation.receiver_delay import CarriedDelay
 from logger.records import WindowRecord
 from logger.service import wiring
@@ -77,12 +75,10 @@ def wired(header: DumpHeader, events: Iterable[Event], seconds: float | None, pl
     kind = accelerometers()[sensor["driver"]]
     if isinstance(kind, SerialAccelerometer):
         return Wired(header, iter(events), bridged="")
-    try:
+    with as_bad_input(place, SettingsError):
         said = RecordedWords(sensor)
         settings = kind.recorded(said, kind.settings(), is_given=False)
         axis = said.name("vertical_axis", "+z", AXES)
-    except SettingsError as error:
-        raise BadInput(f"{place}: {error}") from None
     oversample = kind.readings(settings).oversample
     if oversample != 1:
         raise BadInput(f"{place}: expected a {kind.title} read 100 times a second, found oversample {oversample}")

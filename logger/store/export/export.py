@@ -19,8 +19,6 @@ and a second export copies what the first one did not. Nothing is written when a
 write-protected by then is no fault. What a stick holds is never taken into memory as a whole.
 """
 
-from __future__ import annotations
-
 import errno
 import os
 import re

@@ -8,8 +8,6 @@ else. It is written and read line by line, and not beyond what a logger could ev
 reads it too.
 """
 
-from __future__ import annotations
-
 import hashlib
 import re
 from collections.abc import Iterable, Iterator, Mapping

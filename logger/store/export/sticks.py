@@ -28,8 +28,6 @@ did not get everything, and is steady when all may be pulled. When the last stic
 did before.
 """
 
-from __future__ import annotations
-
 import errno
 import fcntl
 import hashlib

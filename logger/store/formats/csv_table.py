@@ -11,8 +11,6 @@ the table at once, and only when that fails are the lines looked at one by one t
 longer than ``LINE_BYTES``: a million columns, or a line without an end, would take many times the memory of the file.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import re

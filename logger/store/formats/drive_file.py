@@ -8,8 +8,6 @@ missing, or a clock that skips, would end as a wrong vehicle. Solution: a run is
 as records and profiles are. Columns of other names are not read.
 """
 
-from __future__ import annotations
-
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, fields, replace
 from functools import partial

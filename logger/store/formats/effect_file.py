@@ -5,8 +5,6 @@ was fitted and, for a user's own, ``file``: the Python file that offers it as ``
 file.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import Mapping

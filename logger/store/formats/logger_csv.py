@@ -1,7 +1,5 @@
 """CSV files of phones and other loggers: known layouts, columns that are named, and the table by role."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

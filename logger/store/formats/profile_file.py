@@ -28,8 +28,6 @@ oldest files, right behind the END line. The specification names no byte order; 
 that can be no elevations in it are refused. Units are never guessed: a file that does not name them is refused.
 """
 
-from __future__ import annotations
-
 import re
 from array import array
 from collections.abc import Sequence

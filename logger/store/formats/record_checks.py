@@ -9,8 +9,6 @@ is reported with the result.
 Records of many channels as CSV: ``t_s`` and any number of evenly sampled columns, named by the header.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path

@@ -5,8 +5,6 @@ like any others. Solution: the times must lie on an even grid, but for the round
 not is refused with its line. Columns of other names are not read.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

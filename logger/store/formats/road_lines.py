@@ -1,8 +1,6 @@
 """GeoJSON files (RFC 7946): roads as lines, as an extract of OpenStreetMap gives them, and a route: a line with
 measures, as road agencies keep it, or with kilometre posts beside it."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Iterator

@@ -12,8 +12,6 @@ be written to, and for the vehicles that come with the program, the file lies in
 step, so that a reader sees the old one or the new one.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import re

@@ -1,7 +1,5 @@
 """YAML files that people write, as nodes that know their line (``drivers.plain_yaml``) and complain as BadInput."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from pathlib import Path
 

@@ -12,8 +12,6 @@ A new content is written to a temporary file, waited for, and renamed into place
 whenever the power goes.
 """
 
-from __future__ import annotations
-
 import errno
 import fcntl
 import logging
@@ -123,7 +121,7 @@ class FolderLock:
             raise BadInput(
                 f"{folder}: another ridelog is writing here (see ridelog status); give each its own folder") from None
 
-    def __enter__(self) -> FolderLock:
+    def __enter__(self) -> "FolderLock":
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,

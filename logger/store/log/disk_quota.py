@@ -1,7 +1,5 @@
 """The disk under a folder of logs: which one it is, recordings on it, and what goes when room runs short."""
 
-from __future__ import annotations
-
 import logging
 import os
 import re

@@ -9,8 +9,6 @@ of one of these on a stick is called ``<name>.<8 hex digits>.old``, those of one
 The number of a session is never given twice, whatever is lost.
 """
 
-from __future__ import annotations
-
 import re
 import zlib
 from collections.abc import Iterator
@@ -50,7 +48,7 @@ class OwnFile:
     is_open: bool
 
     @classmethod
-    def of(cls, name: str) -> OwnFile | None:
+    def of(cls, name: str) -> "OwnFile | None":
         """The name of a file, without its folder; None when it is none of a logger's."""
         if match := _LOG.fullmatch(name):
             return cls(int(match[1]), int(match[2]), match[3] or match[5], match[4] is not None)

@@ -3,8 +3,6 @@
 Rows are joined when the next begins where the last ended and lies near it; what is not joined is a gap, and stays one.
 """
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass

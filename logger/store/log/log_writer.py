@@ -32,8 +32,6 @@ them to a new part once the disk takes them again: the part that failed is never
 come at growing intervals. A disk that fails before there is a log (at the start of the service) is the same case.
 """
 
-from __future__ import annotations
-
 import logging
 from collections import deque
 from collections.abc import Callable, Iterable

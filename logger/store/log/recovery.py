@@ -1,7 +1,5 @@
 """A folder of logs put right after a cut of the power: each open part is finished, and no row is lost or repeated."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress

@@ -9,8 +9,6 @@ unknown as nothing at all. ``scan`` reads a log that may be damaged anywhere and
 also those beside a lost newline.
 """
 
-from __future__ import annotations
-
 import re
 import zlib
 from collections.abc import Callable, Iterator

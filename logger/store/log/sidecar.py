@@ -10,8 +10,6 @@ Problem. A scale or a clock with one wrong digit makes every row wrong, though e
 The content carries a checksum of itself, and nothing is read of a sidecar that does not fit it.
 """
 
-from __future__ import annotations
-
 import heapq
 import json
 from collections.abc import Iterable, Iterator, Sequence

@@ -6,8 +6,6 @@ white noise of 0.05 m/s2. The road around the bump has IRI 5 m/km (4.4.1), which
 contain.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import chain, pairwise
 

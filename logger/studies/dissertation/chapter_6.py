@@ -8,7 +8,7 @@ import numpy as np
 from logger.chart_data import Curves, Field, Line
 from logger.comfort.iso2631 import COMFORT_WORDS, comfort_word
 from logger.estimation import rms_calibration
-from logger.estimation.rms_calibration import CalibrationSettings, calibrate
+from logger.estimation.rms_calibration import SPEEDS_MPH, CalibrationSettings, calibrate
 from logger.identification.identifiability import NotIdentifiable
 from logger.identification.prediction_error_fit import Fit
 from logger.identification.unknown_inputs import Bump, RoadInput, RoadStep
@@ -363,7 +363,6 @@ T6_5 = Study("table_6_5", "Three revisited places, and the obstacles that would 
                           "realistic sizes would explain the published words."),))
 
 
-SPEEDS_MPH = tuple(range(10, 71, 10))
 PRINTED_GD_CM3 = (2.0, 4096.0)
 
 

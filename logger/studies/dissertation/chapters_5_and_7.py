@@ -3,8 +3,6 @@
 Section 7.2: what the dissertation leaves to later work.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,7 +10,7 @@ import numpy as np
 from logger.chart_data import Curves, Line
 from logger.estimation.batch import RoadProfile, band_passed, estimated
 from logger.estimation.error_bound import ErrorBound
-from logger.estimation.rms_calibration import rms_relation
+from logger.estimation.rms_calibration import SPEEDS_MPH, rms_relation
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
 from logger.identification.identifiability import NotIdentifiable
@@ -28,7 +26,7 @@ from logger.profiles.track import Track
 from logger.runs import Run
 from logger.shipped import vehicle_file, vehicle_names
 from logger.store.formats.vehicle_file import read_vehicle
-from logger.studies.dissertation.chapter_6 import SPEEDS_MPH, WAVINESS
+from logger.studies.dissertation.chapter_6 import WAVINESS
 from logger.studies.drives import (
     BRIDGE_MPS,
     BUMP_HEIGHT_M,

@@ -6,8 +6,6 @@ the axles are near the mode's nodes it moves the sensor and hardly the ends of t
 ends move by p e, so that the forces work on what they move.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

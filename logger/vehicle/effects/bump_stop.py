@@ -4,8 +4,6 @@ Beyond a clearance c of compression from rest a stop adds the force k (compressi
 clearance of its own and the same stiffness k.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Values

@@ -4,8 +4,6 @@ The axles stay where they are, and so does the sensor, so that all of them come 
 beyond an axle is applied as well, so that a fit may pass there; ``check_on`` refuses it where somebody asks for it.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from logger.vehicle.effect import Parameter, Scale, Values, VehicleEffect

@@ -4,8 +4,6 @@ What moves without a spring drifts under it. A linear spring takes it up where i
 that is not linear works around another place then, and is stiffer one way than the other.
 """
 
-from __future__ import annotations
-
 from logger.vehicle.effect import ForceEffect, Parameter, Scale, Sought, Values
 from logger.vehicle.laws import CornerLaws
 from logger.vehicle.vehicle import Vehicle

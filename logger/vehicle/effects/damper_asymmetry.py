@@ -3,8 +3,6 @@
 With r the ratio of the two slopes and their mean kept, rebound has 2 r / (1 + r) and bump 2 / (1 + r) of the mean.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -5,8 +5,6 @@ direction has valves of its own: where these differ, the knee in rebound is the 
 velocity and that in bump the knee velocity over that root, and so are the slopes beyond.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

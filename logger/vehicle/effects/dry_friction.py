@@ -4,8 +4,6 @@ While the suspension slides the force is F sign(x'); while it sticks, whatever k
 rubber gives way first: then the force is F tanh(x' / v), with v the rate at which it has nearly grown to F.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from logger.vehicle.effect import (

@@ -4,8 +4,6 @@ The command, or the current, was recorded as a force F; what acts is L tanh(F / 
 more than L.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from logger.arrays import Array

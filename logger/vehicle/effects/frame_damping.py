@@ -6,8 +6,6 @@ ground: a search tries this effect on rigs alone, or where it is asked for by na
 A single mass has one guide, which stands on the ground while its base moves.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from logger.vehicle.effect import BodyEffect, Parameter, Scale, Sought, Values

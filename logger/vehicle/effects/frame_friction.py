@@ -10,8 +10,6 @@ holds a car against the ground: a search tries this effect on rigs alone, or whe
 A single mass has one guide, which stands on the ground while its base moves.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from logger.vehicle.effect import (

@@ -13,8 +13,6 @@ A search tries it first of a part alone on its bench, as rubber does that; of a 
 long again, when all others leave something unexplained.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

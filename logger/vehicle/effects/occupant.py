@@ -5,8 +5,6 @@ frequency and damping ratio are those of the seat with it. On a rig it is whatev
 gives has a second mode, which is that of a mass on a spring.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from logger.vehicle.effect import BodyEffect, Parameter, Scale, Values

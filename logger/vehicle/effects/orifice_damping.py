@@ -1,7 +1,5 @@
 """Oil through an orifice, and air, resist by the square of the rate: beside c v a damper has d v |v|."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Sought, Values

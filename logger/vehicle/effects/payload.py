@@ -5,8 +5,6 @@ it is what hangs between the load cell and the part, and the fluid that it sets 
 acceleration.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from logger.vehicle.effect import Parameter, Scale, Values, VehicleEffect

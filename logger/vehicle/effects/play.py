@@ -5,8 +5,6 @@ answered within the gap, k times the travel clipped to it, is taken away. The da
 of dampers see the laws that ``learn`` tries. A spring that a car's weight presses into its seat has none.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Sought, Values

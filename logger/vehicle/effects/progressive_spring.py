@@ -4,8 +4,6 @@ F = k x + k2 x^2 + k3 x^3, with x the travel from where the car rests. One that 
 cones, coils that touch and all springs under a load are, has k2, which is 0 unless it is said.
 """
 
-from __future__ import annotations
-
 from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Values
 from logger.vehicle.laws import CornerLaws
 

@@ -4,8 +4,6 @@ The half car becomes a full one: twice its masses on four wheels, the left ones 
 ``elevation_right_m``, with the roll of the body between them.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from logger.vehicle.effect import Parameter, Scale, Values, VehicleEffect

@@ -7,8 +7,6 @@ at half of that, and nearly nothing where a sensor's takes some decibels. As a s
 which looks like a resonance there.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import numpy as np

@@ -1,7 +1,5 @@
 """A sensor that reads every acceleration too large, or too small, by the same factor."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from logger.arrays import Complex

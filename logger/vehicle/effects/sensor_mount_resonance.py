@@ -3,8 +3,6 @@
 Between body and sensor lies the transmissibility (2 z w s + w^2) / (s^2 + 2 z w s + w^2).
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from logger.arrays import Complex

@@ -3,8 +3,6 @@
 Its acceleration is z'' + x theta'', nose up positive, with x ahead of the centre of gravity.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from logger.vehicle.effect import Parameter, Scale, Values, VehicleEffect

@@ -3,8 +3,6 @@
 The car was where the recorded distance, divided by the scale, says.
 """
 
-from __future__ import annotations
-
 from logger.arrays import Array
 from logger.vehicle.effect import DriveEffect, Misalignment, Parameter, Scale, Values
 

@@ -1,7 +1,5 @@
 """Two clocks, or a slow bus: the acceleration that is written down is late against the position beside it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 

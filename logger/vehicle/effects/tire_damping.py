@@ -4,8 +4,6 @@ The force on the wheel is k d + c d', with d the tire's deflection. The linear m
 out (Eq 4.12 of Blum 2015).
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from logger.vehicle.effect import ForceEffect, Parameter, Scale, Values

@@ -3,8 +3,6 @@
 What lies under the patch is averaged evenly, so that waves as short as the patch vanish.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from logger.vehicle.effect import Parameter, Scale, Values, VehicleEffect

@@ -4,8 +4,6 @@ The mount, a spring, stands in series with the damper: both carry the force F, a
 damper plus F' / k.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Values

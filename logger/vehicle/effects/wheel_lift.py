@@ -3,8 +3,6 @@
 The tire's whole force, its static load included, is never below 0. The static loads follow from the weights.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from logger.vehicle.effect import ForceEffect, Values

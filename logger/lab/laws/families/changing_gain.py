@@ -1,7 +1,5 @@
 """A sensor whose gain changes as a run goes on: it warms up, or its supply sinks."""
 
-from __future__ import annotations
-
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext
 from logger.vehicle.effect import Chosen, Parameter, Scale
 

@@ -8,8 +8,6 @@ their ends, for nothing is known there. Adaptive dampers: S. M. Savaresi et al.,
 for Vehicles (2010), chapter 2; a tire that spins: H. B. Pacejka, Tire and Vehicle Dynamics (2012), chapter 9.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, handed_on, rounded

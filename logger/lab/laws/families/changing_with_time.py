@@ -6,8 +6,6 @@ A tire's stiffness grows with its pressure (J. Y. Wong, Theory of Ground Vehicle
 temperature; dampers fade (J. C. Dixon, The Shock Absorber Handbook, 2007, section 6.7).
 """
 
-from __future__ import annotations
-
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 

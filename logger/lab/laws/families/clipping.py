@@ -6,8 +6,6 @@ reading sits before the recorder's filter, which rounds the corners: the record 
 it is, limited there, and what was lost goes through such a filter.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded

@@ -5,8 +5,6 @@ a sharp yield. As long as it moves, the damper does not: what the linear damper 
 away, g the gap either way.
 """
 
-from __future__ import annotations
-
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext
 from logger.vehicle.effect import Chosen, Parameter, Scale
 

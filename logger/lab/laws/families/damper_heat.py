@@ -5,8 +5,6 @@ The viscosity of oil falls with its temperature by an exponential (O. Reynolds, 
 logarithm of the damping has lost, the force of the linear damper is exp(-h) c v, and h' = a exp(-h) c v^2 - h / T.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext

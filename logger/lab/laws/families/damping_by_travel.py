@@ -5,8 +5,6 @@ the damper with all that is known of it: fluid that goes past the piston through
 these are.
 """
 
-from __future__ import annotations
-
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 

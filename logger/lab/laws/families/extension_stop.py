@@ -4,8 +4,6 @@ Beyond a clearance it answers with k (x - d) + c x', and lets go where that woul
 (K. H. Hunt and F. R. E. Crossley, J. Applied Mechanics 42, 1975, 440). Its damping is given by the time c / k.
 """
 
-from __future__ import annotations
-
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, handed_on, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 

@@ -6,8 +6,6 @@ Unevennesses, Delft, 1998: short unevennesses as their basic shape). Where the w
 knows: the spot has one place along the way in all runs, where their ways go on, or in each run its own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -5,8 +5,6 @@ bench such a curve is tried behind a spring as well: rubber at the damper's end,
 valves let it through.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 

@@ -3,8 +3,6 @@
 A power of the travel, or a smooth curve through points, which may differ in compression and extension (stops).
 """
 
-from __future__ import annotations
-
 from logger.lab.laws.curves import TRAVEL, CurveFamily
 
 

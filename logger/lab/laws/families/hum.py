@@ -5,8 +5,6 @@ speed of the car as an engine's does in one gear. The road does not cause it, so
 begin elsewhere in each run: then each has two strengths of its own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

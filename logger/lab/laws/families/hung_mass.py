@@ -4,8 +4,6 @@ It is more than the model's masses, in a half car that of one side. At the centr
 list.
 """
 
-from __future__ import annotations
-
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 

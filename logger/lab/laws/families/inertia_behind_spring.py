@@ -8,8 +8,6 @@ where its channel begins and ends (R. Singh, G. Kim, P. V. Ravindra, J. Sound an
 rigidly it is a mass that only the travel moves: the force is b x''.
 """
 
-from __future__ import annotations
-
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, handed_on, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 

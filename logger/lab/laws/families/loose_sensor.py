@@ -11,8 +11,6 @@ last, the record is behind for longer than it is ahead. The residual's kurtosis 
 where it has neither, nothing is tried.
 """
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -5,8 +5,6 @@ that rings, a filter with a notch. 1 + a / (1 + s / w) adds one pole; 1 + a (s /
 as they are, and raises or lowers quick ones.
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext

@@ -5,8 +5,6 @@ Crosby and R. A. Harwood, Journal of Engineering for Industry 96, 1974). An acti
 one can only resist its own rate v: it gives the smaller of C |z'| and B |v| where both have one sign, and else nothing.
 """
 
-from __future__ import annotations
-
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, handed_on, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 

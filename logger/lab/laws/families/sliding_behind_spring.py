@@ -7,8 +7,6 @@ at one usual rate. It acts beside the part's own spring and damper. (What differ
 behind a spring, ``force_by_rate``.)
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, handed_on, rounded

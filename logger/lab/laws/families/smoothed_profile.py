@@ -6,8 +6,6 @@ mean left nothing of is in no profile: no wave is raised more than a hundred tim
 micrometre, and their rounding would be a tenth of a millimetre beyond.
 """
 
-from __future__ import annotations
-
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext
 from logger.vehicle.effect import Chosen, Parameter, Scale
 

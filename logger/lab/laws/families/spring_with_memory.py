@@ -1,8 +1,6 @@
 """A spring whose rubber creeps: a spring and a damper in series, parallel to the suspension's own (Maxwell's
 branch)."""
 
-from __future__ import annotations
-
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, handed_on, rounded
 from logger.vehicle.effect import Chosen, Parameter, Scale
 

@@ -4,8 +4,6 @@ A power of the deflection, or a smooth curve through points, which may differ wh
 let go.
 """
 
-from __future__ import annotations
-
 from logger.lab.laws.curves import DEFLECTION, CurveFamily
 
 

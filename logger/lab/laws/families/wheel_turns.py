@@ -6,8 +6,6 @@ radius is divided. Where a wheel stood when the recording began nobody knows: ea
 alike where their ways go on, or in each run two of its own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np
