@@ -63,7 +63,8 @@ APPROACH_S = 2.0
 _TAIL_S = 2.5
 # What rings in a sensor at the end of a transform has died down so much later, before it comes round to the beginning.
 _REST_S = 1.0
-_KEPT_PLACES, _KEPT_BODIES = 2, 6
+# A derivative by each number of a half car (13), in two threads, begins and ends with the same body.
+_KEPT_PLACES, _KEPT_BODIES = 2, 32
 B = TypeVar("B")
 
 

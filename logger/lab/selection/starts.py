@@ -77,6 +77,7 @@ class UnknownNumbers(MeasuredRoad):
     ends: dict[str, tuple[int, int]] = field(default_factory=dict)
     _squares: dict[int, tuple[Posterior, BySquares]] = field(default_factory=dict)
     _ended: dict[frozenset[str], Sequence[_Drawn]] = field(default_factory=dict)
+    _outdone: tuple[Baseline, State] | None = None
 
     def fitted(self, posterior: Posterior, present: Sequence[Chosen], near: State | None = None) -> Baseline:
         """The model with some effects, fitted from where it is or else from the file's car, and from cars that are
@@ -90,7 +91,8 @@ class UnknownNumbers(MeasuredRoad):
                  pool: ThreadPoolExecutor, progress: Progress) -> list[Screened]:
         """Effects screened on the model, and by squares in cars that are drawn, one after the other: a car ends early
         where it cannot reach the best so far at its pace, and once an effect has shown the numbers of the car, the
-        others are tried with these."""
+        others are tried with these. In the place of an effect they begin with what the model with it has shown, and
+        that effect itself is left out where it ends there again."""
         local = super().screened(base, effects, seen, near, pool, progress)
         # Were numbers far off, the car's resonances would be, and leave more than so little of what was measured.
         if ((base.explanation == 0 or base.hold_out.error < UNEXPLAINED)
@@ -99,13 +101,21 @@ class UnknownNumbers(MeasuredRoad):
         by_squares = self._by_squares(base.posterior)
         anchor = self._anchor(by_squares, base.state, 1)
         least = without = by_squares.deviance(anchor)
-        numbers: Array | None = None
+        known, numbers = np.inf, None
+        if near is not None and self._outdone is not None and self._outdone[0] is base:
+            there = self._outdone[1]
+            if (begun_there := by_squares.at(there.effects, there.logs, there)) is not None:
+                known, best = by_squares.improved(begun_there[1])
+                least = min(known, least)
+                numbers = best.logs if self._shows_the_car(by_squares, anchor, best) else None
         found: list[Screened] = []
         for one in local:
             drafted = one.effect.sought is Sought.NEVER  # by the motions of the records, as it begins
             drawn = [] if drafted else self._cars(by_squares, one.effect, anchor, one.trials, numbers)
             begun = [some[0][1] for some in drawn]
             ends = sorted(pool.map(partial(by_squares.improved, to_reach=least), begun), key=_by_deviance)
+            if near is not None and one.effect is near.effect and ends and ends[0][0] > known - INDISTINGUISHABLE:
+                continue
             found.append(Started(one.effect, one.trials, [each for some in drawn for each in some[1:]], ends,
                                  without - ends[0][0]) if ends else one)
             if ends and ends[0][0] < least and not is_outside_data(base.posterior, ends[0][1].effects[-1]):
@@ -131,14 +141,16 @@ class UnknownNumbers(MeasuredRoad):
 
     def fitted_roughly(self, score: float, base: Baseline, one: Screened, least: float) -> list[CandidateFit]:
         """Fits from the best trial on the model, and from the best of the cars that were drawn: of the effect in its
-        plain form, and with its refinements."""
+        plain form, and with its refinements. Of each form cars are improved until two end alike at the best."""
         if not isinstance(one, Started):
             return fit_roughly(score, base, one, least)
         by_squares = self._by_squares(base.posterior)
-        reached = {state.effects[-1].is_plain: deviance for deviance, state in reversed(one.ends)}
-        others = (by_squares.improved(state, to_reach=reached.get(state.effects[-1].is_plain, np.inf))
-                  for _, state in one.others)
-        ends = sorted([*one.ends, *others], key=_by_deviance)
+        ends = [*one.ends]
+        for _, state in one.others:
+            alike = [deviance for deviance, end in ends if end.effects[-1].is_plain is state.effects[-1].is_plain]
+            if len(alike) < 2 or alike[1] > alike[0] + INDISTINGUISHABLE:
+                ends.append(by_squares.improved(state, to_reach=min(alike, default=np.inf)))
+                ends.sort(key=_by_deviance)
         self._keep(ends)
         trials = {trial.one.is_plain: trial for trial in reversed(one.trials)}
         best = {state.effects[-1].is_plain: state for _, state in reversed(ends)}
@@ -154,7 +166,9 @@ class UnknownNumbers(MeasuredRoad):
     def without(self, now: Baseline, name: str) -> Baseline:
         """The model without an effect, fitted from where it is and from several starts."""
         rest, state = effects_without(now.state, name), now.state
-        return self.fitted(now.posterior, rest, now.posterior.state_at(rest, state.logs, state.record, state.size))
+        found = self.fitted(now.posterior, rest, now.posterior.state_at(rest, state.logs, state.record, state.size))
+        self._outdone = found, state
+        return found
 
     @staticmethod
     def _likeliest(start: State, posterior: Posterior) -> LinearModel:
@@ -177,11 +191,11 @@ class UnknownNumbers(MeasuredRoad):
     def _anchor(self, by_squares: BySquares, near: State, count: int) -> State:
         """The best car by squares with the effects of a state: from there, and from cars that are drawn."""
         here = by_squares.at(near.effects, near.logs, near)
-        begun = [] if here is None else [by_squares.improved(here[1], 6)]
-        drawn = self._cars(by_squares, None, near)
-        begun += [by_squares.improved(state) for some in drawn for _, state in some[:count]]
-        self._keep(begun)
-        return min(begun, key=_by_deviance)[1]
+        begun = dict([] if here is None else [here])
+        begun |= dict(one for some in self._cars(by_squares, None, near) for one in some[:count])
+        ends = list(map(by_squares.improved, begun.values()))
+        self._keep(ends)
+        return min(ends, key=_by_deviance)[1]
 
     def _keep(self, *ends: Sequence[_Drawn]) -> None:
         """Ends of starts, each of one model, where later rounds begin."""
@@ -193,9 +207,9 @@ class UnknownNumbers(MeasuredRoad):
         an effect, unless the car's numbers are ``known``; later rounds begin where these ended, and at its trials on
         the model."""
         cars = self._known(effect, near, trials, known) or self._draw(effect, by_squares.posterior, near)
-        ranked = [[(by_squares.rank(effects, logs, near), effects, logs) for effects, logs in some] for some in cars]
-        best = [[state for _, having, there in sorted(some, key=_by_deviance)[: self.starts]
-                 if (state := by_squares.at(having, there, near)) is not None] for some in ranked]
+        ranked = [{by_squares.rank(effects, logs, near): (effects, logs) for effects, logs in some} for some in cars]
+        best = [[state for deviance in sorted(some)[: self.starts]
+                 if (state := by_squares.at(*some[deviance], near)) is not None] for some in ranked]
         return [some for some in best if some]
 
     def _known(self, effect: Effect | None, near: State, trials: Sequence[Trial], known: Array | None

@@ -1,5 +1,7 @@
 """Effects on a rig whose numbers nobody knows, shaken by an integrator that shares nothing with ridelog."""
 
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,12 +9,16 @@ import pytest
 
 import ridelog
 from logger.lab.likelihood.by_squares import BySquares
+from logger.lab.likelihood.linear_model import LinearModel
+from logger.lab.likelihood.posterior import State
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.whittle import UNEXPLAINED
-from logger.lab.selection.starts import UnknownNumbers
+from logger.lab.selection.screening import Baseline
+from logger.lab.selection.starts import Started, UnknownNumbers
+from logger.vehicle.effect import Misalignment
 
 from ...support.drives.bench_rig import Rig, shaken, swept_table, write_run
-from ...support.lab.secret_runs import car_off_by, posterior_of, secret_runs
+from ...support.lab.secret_runs import EFFECTS, car_off_by, hidden, posterior_of, secret_runs
 
 CANDIDATES = ("progressive_spring", "frame_friction", "dry_friction", "sensor_gain")
 FILE = ("name: bench\nmodel: quarter_car\nsprung_mass_kg: 2.5 +- 2%\nfront:\n  unsprung_mass_kg: {}\n"
@@ -60,6 +66,34 @@ def test_a_start_ends_early_where_it_cannot_reach_another_at_its_pace() -> None:
     assert end < once < begun
     assert by_squares.improved(start, 12, end)[0] == end
     assert by_squares.improved(start, 12, once - 20 * (begun - once))[0] == once
+
+
+@pytest.mark.slow
+def test_more_starts_are_improved_until_two_end_alike_and_what_ends_at_the_model_that_is_there_is_left_out(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    bracket, still = hidden("sensor_mount_resonance", frequency_hz=14.0, damping_ratio=0.1), Misalignment(1.0, 0.0)
+    posterior = posterior_of(secret_runs([bracket], lasts_s=6.0, noise_mps2=0.01), tolerance=Tolerance(numbers=0.5))
+    search = UnknownNumbers(draws=8)
+    base, effects = search.fitted(posterior, ()), [EFFECTS["sensor_mount_resonance"]]
+    with ThreadPoolExecutor(1) as pool:
+        one, = search.screened(base, effects, still, None, pool, lambda words: None)
+        assert isinstance(one, Started) and one.others
+        improved, calls = BySquares.improved, list[float]()
+
+        def spied(self: BySquares, start: State, rounds: int = 12, to_reach: float = np.inf) -> tuple[float, State]:
+            calls.append(to_reach)
+            return improved(self, start, rounds, to_reach)
+
+        monkeypatch.setattr(BySquares, "improved", spied)
+        (least, there), *_ = one.ends
+        search.fitted_roughly(base.score, base, replace(one, ends=[(least, there), (least + 5, there)]), 0.0)
+        assert not calls and search.ends["sensor_mount_resonance"] == (2, 2)
+        search.fitted_roughly(base.score, base, replace(one, ends=[(least, there), (least + 50, there)]), 0.0)
+        assert calls and set(calls) == {least}
+        now = Baseline.of(LinearModel(posterior, there, posterior.number_slopes(there, posterior.prior.steps)))
+        without = search.without(now, "sensor_mount_resonance")
+        assert not search.screened(without, effects, still, there.effects[0], pool, lambda words: None)
+        assert search.screened(without, effects, still, None, pool, lambda words: None)
 
 
 def test_on_a_road_a_car_is_compared_where_it_was_not_where_another_would_have_been() -> None:
