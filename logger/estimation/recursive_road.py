@@ -104,9 +104,7 @@ class FollowedRoad:
     ) -> None:
         self._vehicle_error, self._noise_log_std = vehicle_error, noise_log_std
         self._is_coarse, self._step_mps2 = sensor.is_coarse, sensor.step_mps2
-        # What bounds say already counts what was in a reading before it was rounded. Not where the noise is learned of
-        # them: what is left of it would come out too small (a drive of 70 s: 0.03 for 0.1 m/s2).
-        self._bounds_with_all = self._is_coarse and noise is None
+        self._noise_is_all = self._is_coarse and noise is not None  # learned of bounds, it holds the car's own error
         self._sensor = sensor
         self._spacing_m = spacing_m
         self._other = OtherMotion()
@@ -288,11 +286,12 @@ class FollowedRoad:
         log_variance = self._roughness.solved_with(first, block.count)
         local = np.exp(np.maximum(log_variance, _SMOOTHEST_SOLVED) - above_common)
         there = _levelled(spectrum, local)
-        beside_road = vehicle_error_variance(
-            block.car, block.mean_speed_mps, there, self._vehicle_error, RATE_HZ * reads
-        ) + reads * (beyond_variance + self._other.variance_left)
+        beside_road = reads * (beyond_variance + self._other.variance_left)
+        if not self._noise_is_all:
+            beside_road += vehicle_error_variance(
+                block.car, block.mean_speed_mps, there, self._vehicle_error, RATE_HZ * reads)
         variance = readings.variance
-        if self._bounds_with_all:
+        if self._is_coarse:  # it was in a reading before it was rounded
             self._beside_road = beside_road
         else:
             variance = variance + beside_road
@@ -394,8 +393,9 @@ class FollowedRoad:
         others = others + unexplained(solution.fitted_mps2[read], low[read], high[read], self._noise_variance)
         fitted_variance = 1 / (1 / others + 1 / readings.variance)
         if usable is not None:
-            expected = without_own(readings, solution.fitted_mps2, fitted_variance)
-            self._learn_from_bounds(*expected, low, high, usable, samples.reading_mps2.shape[1])
+            expected, about = without_own(readings, solution.fitted_mps2, fitted_variance)
+            self._learn_from_bounds(expected, about + self._beside_road, low, high, usable,
+                                    samples.reading_mps2.shape[1])
         return improved(readings, low, high, solution.fitted_mps2, fitted_variance, self._noise_variance)
 
     @property

@@ -40,8 +40,6 @@ UNKNOWN_LOG_STD = 1.0
 # noise does not blur the steps, as found on drives of known noise (tests/benchmarks/noise.py).
 _MODEL_LOG_STD, _ROUGH_LOG_STD = 0.04, 5e-4
 _WANDERED_LOG_STD = 0.05  # from drive to drive: temperature, supply
-_FORGOTTEN_PER_STRETCH = 0.005
-_FORGOTTEN_PER_LOG = 5.0  # what was learned of another noise is no longer quite true of this one
 _LEAST_SHARE = 0.05
 _EXPECTED_STRETCHES = 4.0  # count as having scattered as they should
 _SPACING, _REACH = 0.1, 35  # of the grid in the log noise: a factor of 33 up and down
@@ -126,8 +124,9 @@ class NoiseBelief:
 class NoiseLearner:
     """Follows the noise from stretch to stretch, from what was believed before.
 
-    usual        of such a sensor: to this a belief returns slowly where nothing more is heard (stabilised forgetting;
-                 Kulhavy and Zarrop, International Journal of Control 58, 1993)
+    usual        of such a sensor: to this a belief returns from drive to drive where nothing more is heard (stabilised
+                 forgetting; Kulhavy and Zarrop, International Journal of Control 58, 1993). Within a drive nothing is
+                 forgotten: a noise is a constant of the sensor
     step_mps2    readings are bounds this wide [m/s2]; 0: they are not
 
     ``log_noise`` (g,) are the noises that stretches are to be judged by: logarithms of m/s2.
@@ -157,30 +156,22 @@ class NoiseLearner:
         """One more stretch, which shares no reading with those before it: how probable it is for each of
         ``log_noise`` (g,), as a logarithm and up to a constant."""
         slopes = np.gradient(log_evidence, _SPACING)
-        self._prior = (1 - _FORGOTTEN_PER_STRETCH) * self._prior + _FORGOTTEN_PER_STRETCH * self._usual
-        self._forget(_FORGOTTEN_PER_STRETCH)
         self._evidence = self._evidence + log_evidence
         self._slopes = self._slopes + slopes
         self._squares = self._squares + slopes**2
         self._heard += 1
         self._stretches += 1
-        before = self._mean
         at, _ = self._moments(1.0)
         self._mean, self._std = self._moments(self._excess(at))
-        self._forget(1 - exp(-_FORGOTTEN_PER_LOG * abs(self._mean - before)))
 
     def next_drive(self) -> None:
         """Another drive begins: the noise may have wandered, as in ``NoiseBelief.next_drive``."""
         kept = self._std**2 / (self._std**2 + _WANDERED_LOG_STD**2)
         self._prior = kept * self._prior + (1 - kept) * self._usual
-        self._forget(1 - kept)
+        self._evidence, self._slopes, self._squares = (
+            kept * row for row in (self._evidence, self._slopes, self._squares))
+        self._heard *= kept
         self._std = min(hypot(self._std, _WANDERED_LOG_STD), UNKNOWN_LOG_STD)
-
-    def _forget(self, share: float) -> None:
-        self._evidence = (1 - share) * self._evidence
-        self._slopes = (1 - share) * self._slopes
-        self._squares = (1 - share) * self._squares
-        self._heard *= 1 - share
 
     def _excess(self, log_noise: float) -> float:
         """How much more the slopes of the stretches scatter at a noise than the bend of their evidence says that they
