@@ -194,6 +194,17 @@ def test_a_drive_of_quadratic_stretches() -> None:
     assert 0.3 < np.sqrt(np.mean(np.square(off))) < 1.3
 
 
+def test_a_drive_s_first_stretches_count_as_its_last() -> None:
+    """A noise is a constant of the sensor: at the end the same is believed of it, in whatever order it was heard."""
+    says = np.log(0.1) + np.linspace(-0.5, 0.5, 30)
+    ahead, back = (NoiseLearner(USUAL, USUAL, STEP) for _ in range(2))
+    for one, other in zip(says, says[::-1], strict=True):
+        ahead.take(-10 * (ahead.log_noise - one) ** 2)
+        back.take(-10 * (back.log_noise - other) ** 2)
+    assert ahead.belief.log_mean == pytest.approx(back.belief.log_mean, abs=1e-9)
+    assert ahead.belief.log_std == pytest.approx(back.belief.log_std, rel=1e-9)
+
+
 def test_stretches_that_disagree_more_than_they_should_make_it_less_certain() -> None:
     calm, wild = (NoiseLearner(USUAL, USUAL, 0.0) for _ in range(2))
     for number in range(60):
