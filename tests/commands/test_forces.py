@@ -588,6 +588,21 @@ def test_a_spring_that_is_stiffer_to_one_side_is_found_where_it_is(quadratic: fl
     assert found.parameters["quadratic_stiffness_n_per_m2"] == pytest.approx(quadratic, rel=0.02, abs=1e-6)
 
 
+def test_springs_that_incline_are_found_by_their_geometry(tmp_path: Path) -> None:
+    """Two of 2500 N/m and 45 mm, stretched to 60 mm across the travel, which goes as far."""
+    way = noise(3.0, 0.02, 6)
+    x_m = way(TIME_S)
+    long_m = np.hypot(0.06, x_m)
+    force_n = 2 * 2500.0 * (long_m - 0.045) * x_m / long_m + 90.0 * way(TIME_S, 1)
+    force_n += np.random.default_rng(1).normal(0.0, 0.05, len(force_n))
+    run = written(tmp_path / "run", {"force_n": force_n}, {"displacement_m": x_m}, "source: me\n")
+    (tmp_path / "part.yaml").write_text(
+        "name: spring\nmodel: component\nstiffness_n_per_m: 1100\ndamping_n_s_per_m: unknown\n")
+    found = ridelog.add_effect("progressive_spring", tmp_path / "part.yaml", [run])
+    assert found.parameters["levelling_per_m2"] == pytest.approx(1 / 0.06**2, rel=0.02)
+    assert found.parameters["cubic_stiffness_n_per_m3"] == pytest.approx(2500 * 0.045 / 0.06**3, rel=0.02)
+
+
 @pytest.mark.slow
 def test_the_zero_of_the_force_on_a_hardening_spring_is_found(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
