@@ -97,7 +97,9 @@ def _machine_code(force: Any, rates: Any, numbers: Any, memory: int) -> Any:
     from numba.np.unsafe import ndarray
 
     count, first = len(numbers._fields), MEMORY_AT
-    compiled: Any = numba.njit(error_model="numpy")
+    # Compiled code alone calls these: ways in from Python and C would take half of the time.
+    inside: dict[str, Any] = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    compiled: Any = numba.njit(**inside)
     own_force, own_rates = compiled(force), compiled(rates if rates is not None else force)
     pointer = numba.types.CPointer(numba.types.float64)
     of_array: Any = ndarray.to_fixed_tuple
