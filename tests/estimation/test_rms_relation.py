@@ -16,7 +16,6 @@ RAV4 = read_vehicle(vehicle_file("rav4-2009"))
 A, B = half_car(RAV4).state_space()
 SPACING_M = 0.05
 WHEELBASE_M = 2.94
-CG_M = 1.47
 
 
 def under_wheels(elevation_m: np.ndarray) -> np.ndarray:

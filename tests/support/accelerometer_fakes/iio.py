@@ -79,7 +79,6 @@ class FakeIio(Fake):
         self.next_us = float(clock.now_us)
         self.clock_error = 0.0
         self.taken = 0
-        self.jitter_us = 0
         self.writer: int | None = None
         self.is_there = False
 

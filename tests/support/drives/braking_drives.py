@@ -77,7 +77,6 @@ class SeenDrive:
     fix_speed_mps: Array
     forward: Array  # (3,) forward in the sensor's frame
     upward: Array  # (3,) up in the sensor's frame
-    true_speed_mps: Array
 
 
 def drive(kind: str, seconds: float, mounting: Mounting, receiver: Receiver, instrument: Instrument, seed: int,
@@ -109,7 +108,7 @@ def drive(kind: str, seconds: float, mounting: Mounting, receiver: Receiver, ins
     if instrument.step_mps2:
         readings = np.round(readings / instrument.step_mps2) * instrument.step_mps2
     fix_time_s, fix_speed = _fixes(time_s, speed, receiver, rng)
-    return SeenDrive(time_s, readings * instrument.unit, fix_time_s, fix_speed, frame[:, 0], frame[:, 2], speed)
+    return SeenDrive(time_s, readings * instrument.unit, fix_time_s, fix_speed, frame[:, 0], frame[:, 2])
 
 
 def _fixes(time_s: Array, speed: Array, receiver: Receiver, rng: np.random.Generator) -> tuple[Array, Array]:

@@ -9,8 +9,6 @@ from ..catalogue import Report, trial
 from ..guest import UmlGuest
 from ..image import put_source
 
-MARK = "quota_bytes: 300000000"
-
 
 @trial("the README's steps install it; the service starts, under the user ridelog, watched and confined")
 def install(bench: Bench, report: Report) -> None:
