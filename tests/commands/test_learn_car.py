@@ -39,6 +39,7 @@ def learned(runs: list[Path], tmp_path_factory: pytest.TempPathFactory) -> tuple
     return json.loads(found.stdout), folder / "car.yaml", folder / "car.html"
 
 
+@pytest.mark.slow
 def test_frequencies_and_damping_are_those_of_the_car(learned: tuple[dict[str, Any], Path, Path]) -> None:
     found = learned[0]
     for end in ("front", "rear"):
@@ -49,6 +50,7 @@ def test_frequencies_and_damping_are_those_of_the_car(learned: tuple[dict[str, A
     assert all(one["std_share"] < 0.5 * one["std_share_before"] for one in found["iri"])
 
 
+@pytest.mark.slow
 def test_the_file_is_a_vehicle_whose_errors_the_box_can_use(learned: tuple[dict[str, Any], Path, Path]) -> None:
     _, path, page = learned
     model = read_model(path)

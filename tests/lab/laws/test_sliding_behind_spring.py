@@ -19,6 +19,7 @@ from logger.vehicle.compose import compose
 from logger.vehicle.effect import Effect, chosen
 
 from ...support.drives.part_bench import Array, fitted_error, force_of, moved, write_bench, write_part
+from ...support.slow import slow
 
 FORCE_N, OVER_M, POWER, PLAY_M, STIFFNESS, DAMPING = 400.0, 0.002, 3.0, 0.0005, 2000.0, 300.0
 
@@ -54,6 +55,7 @@ def predicted(folder: Path, place_m: Array, variant: str, values: dict[str, floa
     return found, linear_n, law.values["sliding_rate_m_per_s"]
 
 
+@pytest.mark.slow
 def test_the_file_of_a_law_is_kept_where_its_fit_begins_at_another_size(tmp_path: Path) -> None:
     bench, effect = bench_of(tmp_path, moved(1, 4.0, 0.02, 6.0), "alike")
     posterior = bench.posterior(searches=True)
@@ -61,6 +63,7 @@ def test_the_file_of_a_law_is_kept_where_its_fit_begins_at_another_size(tmp_path
     assert begun is not None and begun.effects[-1].file == "law.py"
 
 
+@pytest.mark.slow
 def test_what_nobody_knows_of_its_beginning_pulls_no_harder_than_it_slides(tmp_path: Path) -> None:
     """Friction that gives over 20 um: what slides forgets its beginning within the samples that are left out, which
     fix no state of it."""
@@ -69,7 +72,7 @@ def test_what_nobody_knows_of_its_beginning_pulls_no_harder_than_it_slides(tmp_p
     assert 0.8 * FORCE_N < np.abs(found - linear_n).max() < 1.5 * FORCE_N
 
 
-@pytest.mark.parametrize(("variant", "play_m"), [("alike", 0.0), ("with play", PLAY_M)])
+@pytest.mark.parametrize(("variant", "play_m"), [*slow(("alike", 0.0)), ("with play", PLAY_M)])
 def test_it_is_the_force_of_its_equations(variant: str, play_m: float, tmp_path: Path) -> None:
     place_m = moved(1, 8.0, 0.02, 6.0)
     found, linear_n, rate_mps = predicted(tmp_path, place_m, variant, {

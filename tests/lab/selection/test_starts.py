@@ -48,6 +48,7 @@ def test_an_effect_is_found_though_the_file_is_off_by_a_factor_of_two(
         assert np.isfinite([error for _, error in found.steps]).all()
 
 
+@pytest.mark.slow
 def test_cars_are_drawn_once_and_later_fits_begin_where_these_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     posterior = posterior_of(secret_runs(lasts_s=4.0), car_off_by(0.3, 2), Tolerance(numbers=0.5))
     search, ranked, rank = UnknownNumbers(), list[float](), BySquares.rank
