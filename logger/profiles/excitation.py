@@ -122,10 +122,10 @@ class Excitation:
         return replace(self, elevation_m=np.stack(moved, axis=1).reshape(self.elevation_m.shape),
                        force_n=np.stack(pushed, axis=1) if pushed else None)
 
-    def times(self, factor: float) -> Excitation:
-        """The same, all of it larger by a factor."""
-        return replace(self, elevation_m=factor * self.elevation_m,
-                       force_n=None if self.force_n is None else factor * self.force_n)
+    def times(self, table: float, forces: float) -> Excitation:
+        """The same, the table's motion larger by a factor, and the forces by another."""
+        return replace(self, elevation_m=table * self.elevation_m,
+                       force_n=None if self.force_n is None else forces * self.force_n)
 
     @cached_property
     def _denoised_m(self) -> list[Denoised]:

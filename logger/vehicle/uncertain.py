@@ -21,6 +21,8 @@ from logger.vehicle.vehicle import Vehicle
 _LEAST_VARIANCE = 1e-6
 _HALF_NORMAL = (-float(np.euler_gamma + np.log(2)) / 2, float(np.pi / np.sqrt(8)))
 """Mean and standard deviation of ln |z| of a standard normal z."""
+# Powers of mass and length in units.
+_DIMENSIONS = {"kg": (1, 0), "n": (1, 1), "m": (0, 1), "m2": (0, 2), "m3": (0, 3), "mps2": (0, 1)}
 _FARTHEST = 1.0  # a size that may be off by more than a factor e is not known at all
 
 
@@ -209,11 +211,18 @@ def sized(effect: Effect, vehicle: Vehicle, scales: Scales | None = None) -> Eff
     return made
 
 
+def dimensions_of(name: str) -> tuple[int, int]:
+    """The powers of mass and of length in the unit of a number of a car or an effect."""
+    above, _, below = name.partition("_per_")
+    powers = [(sign * mass, sign * length) for units, sign in ((above.split("_")[1:], 1), (below.split("_"), -1))
+              for mass, length in (_DIMENSIONS.get(unit, (0, 0)) for unit in units)]
+    return sum(mass for mass, _ in powers), sum(length for _, length in powers)
+
+
 def grows_with_mass(name: str) -> bool:
     """Whether a number of a car or an effect, by its unit, grows by the same factor as all masses and forces do where a
     vehicle moves alike."""
-    above = name.partition("_per_")[0].split("_")[1:]
-    return "kg" in above or "n" in above
+    return dimensions_of(name)[0] > 0
 
 
 def _factors(vehicle: Vehicle) -> tuple[float, float, float]:

@@ -506,6 +506,27 @@ def test_a_law_of_a_travel_is_known_no_better_than_that_travel(tmp_path: Path) -
     assert abs(found.parameters[name] - 4e8) < 2 * found.standard_errors[name]
 
 
+@pytest.mark.slow
+def test_the_size_of_a_rig_is_known_no_better_than_the_force_that_drives_it(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A mass on a spring with play, under a force that is read 1 % too large: mass, spring and damper are, too."""
+    bench, push = Bench(2.5, 3000.0, 9.0, play_m=5e-4), noise(25.0, 12.0, 8)
+    seen = bench.moved(NOTHING, push, NOTHING)["accel_z_mps2"]
+    seen = seen + np.random.default_rng(1).normal(0.0, 0.01, len(seen))
+    run = written(tmp_path / "run", {"accel_z_mps2": seen}, {"force_n": 1.01 * push(TIME_S)}, BODY)
+    (tmp_path / "mass.yaml").write_text("name: mass\nmodel: single_mass\nmass_kg: 2.6 +- 20%\n"
+                                        "stiffness_n_per_m: 2500 +- 50%\ndamping_n_s_per_m: 12 +- 50%\n")
+    assert main(["add-effect", "play", "--vehicle", str(tmp_path / "mass.yaml"), "--out", str(tmp_path / "with.yaml"),
+                 str(run), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    numbers = {one["name"]: one for one in found["vehicle_parameters"]}
+    true = {"mass_kg": bench.mass, "stiffness_n_per_m": bench.spring, "damping_n_s_per_m": bench.damper}
+    for name, number in numbers.items():
+        assert 0.009 < number["with_standard_error"] / number["with"] < 0.015
+        assert abs(number["with"] - true[name]) < 2 * number["with_standard_error"]
+    assert abs(found["parameters"]["half_gap_m"] - bench.play_m) < 2 * found["standard_errors"]["half_gap_m"] < 1e-5
+
+
 def test_a_part_is_moved_or_pushed(tmp_path: Path) -> None:
     run = bench_of_a_part(tmp_path)
     text = (run / "excitation.csv").read_text().replace("t_s,displacement_m", "t_s,displacement_m,force_n")

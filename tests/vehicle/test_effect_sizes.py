@@ -7,7 +7,7 @@ import pytest
 from logger.shipped import vehicle_path
 from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.vehicle_file import read_vehicle
-from logger.vehicle.uncertain import grows_with_mass, sized
+from logger.vehicle.uncertain import dimensions_of, grows_with_mass, sized
 from logger.vehicle.vehicle import Axle, Vehicle
 
 RIG = Vehicle("bench", "quarter_car", 2.5, None, Axle(0.0, 0.4, 900.0, 12.0, 5400.0), None, 0.0)
@@ -45,9 +45,10 @@ def test_a_rig_with_a_wheelbase_has_places_of_its_size() -> None:
     assert sized(shipped_effects()["sensor_offset"], bench).parameters[0].start == pytest.approx(0.03)
 
 
-@pytest.mark.parametrize(("name", "grows"), [
-    ("friction_force_n", True), ("sprung_mass_kg", True), ("front.suspension_stiffness_n_per_m", True),
-    ("pitch_inertia_kg_m2", True), ("quadratic_damping_n_s2_per_m2", True), ("clearance_m", False),
-    ("transition_velocity_m_per_s", False), ("damping_ratio", False), ("contact_patch_m", False)])
-def test_what_grows_with_all_masses(name: str, grows: bool) -> None:
-    assert grows_with_mass(name) == grows
+@pytest.mark.parametrize(("name", "mass", "length"), [
+    ("friction_force_n", 1, 1), ("sprung_mass_kg", 1, 0), ("front.suspension_stiffness_n_per_m", 1, 0),
+    ("pitch_inertia_kg_m2", 1, 2), ("quadratic_damping_n_s2_per_m2", 1, -1), ("clearance_m", 0, 1),
+    ("cubic_stiffness_n_per_m3", 1, -2), ("transition_velocity_m_per_s", 0, 1), ("damping_ratio", 0, 0)])
+def test_the_powers_of_mass_and_length_in_a_unit(name: str, mass: int, length: int) -> None:
+    assert dimensions_of(name) == (mass, length)
+    assert grows_with_mass(name) == bool(mass)

@@ -79,8 +79,13 @@ class Posterior:
     def shows_forces(self) -> bool:
         """Whether a force was measured, that drives a rig or that a part pulls back with: else a car in which all
         masses and forces are larger by one factor moves the same."""
-        return any(signal.measures == "force" for run in self.runs.runs for signal in (run.facts.main, *run.signals)
-                   ) or any(isinstance(run.track, Excitation) and run.track.forces for run in self.runs.runs)
+        return self.measures_forces or any(isinstance(run.track, Excitation) and run.track.forces
+                                           for run in self.runs.runs)
+
+    @property
+    def measures_forces(self) -> bool:
+        """Whether a signal is a force."""
+        return any(signal.measures == "force" for run in self.runs.runs for signal in (run.facts.main, *run.signals))
 
     def simulated(self, fine_hz: float) -> Posterior:
         """The posterior with runs simulated in so many steps a second."""
@@ -179,8 +184,24 @@ class Posterior:
 
     def carried_gain(self, state: State) -> list[Array]:
         """The same by one standard deviation of the gain of what measured the input."""
-        return self._changed_by(state, [one.times(1 + self.tolerance.scale) if isinstance(one, Excitation) else one
-                                        for one in (run.track for run in self.runs.runs)])
+        gain = 1 + self.tolerance.scale
+        return self._changed_by(state, self._input_times(gain, gain))
+
+    def size_slopes(self, state: State, with_lengths: bool) -> list[Array]:
+        """Derivatives (1, n) of the predictions, per run, by the logarithm of all masses and forces of the car and of
+        its effects together: what forces that drive it do less; ``with_lengths`` (2, n), by that of all lengths and
+        forces, too: what was measured of the motion is larger by it, what the table does with it less."""
+        step = self.tolerance.scale
+        slopes = [-one[None] / step for one in self._changed_by(state, self._input_times(1.0, 1 + step))]
+        if not with_lengths:
+            return slopes
+        moves = (one.reshape(-1, run.count) for one, run in zip(state.predictions, self.runs.runs, strict=True))
+        return [np.vstack([of_mass, (move - move.mean(axis=1, keepdims=True)).ravel() - driven / step])
+                for of_mass, move, driven in zip(slopes, moves, self.carried_gain(state), strict=True)]
+
+    def _input_times(self, table: float, forces: float) -> list[WheelTracks]:
+        return [one.times(table, forces) if isinstance(one, Excitation) and (table != 1 or one.forces) else one
+                for one in (run.track for run in self.runs.runs)]
 
     def _changed_by(self, state: State, tracks: Sequence[WheelTracks]) -> list[Array]:
         if all(one is run.track for one, run in zip(tracks, self.runs.runs, strict=True)):
