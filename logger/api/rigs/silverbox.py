@@ -77,8 +77,8 @@ def _verdict(found: data_sets.Improved, linear: list[float], better: list[float]
     names = " and ".join(found.diagnosis.verdict) or "nothing"
     return (f"diagnose names {names}. On the multisine, which no fit used, the simulated output is off by "
             f"{better[0]:.2f} mV, {linear[0]:.2f} mV as a linear rig; on the arrow by {better[1]:.2f} mV instead of "
-            f"{linear[1]:.2f} mV. Beyond a linear model it has {len(found.effects.rows)} fitted parameters, and it holds "
-            "outside the amplitudes of the fit, where a black box has to extrapolate.")
+            f"{linear[1]:.2f} mV. Beyond a linear model it has {len(found.effects.rows)} fitted parameters, and it "
+            "holds outside the amplitudes of the fit, where a black box has to extrapolate.")
 
 
 _DOWNLOAD = "download SilverboxFiles.zip from nonlinearbenchmark.org and unpack it; SNLS80mV is read"
