@@ -21,9 +21,7 @@ from logger.lab.likelihood.posterior import NotSimulated, Posterior, State, deri
 from logger.lab.likelihood.priors import CONFLICT_SIGMA
 from logger.lab.likelihood.signals import JointWhitener
 from logger.profiles.track import Track
-from logger.runs import are_on_rig
-from logger.vehicle.effect import Chosen, Parameter, Sought
-from logger.vehicle.models import structure_of
+from logger.vehicle.effect import Chosen, Parameter
 from logger.vehicle.named_parameters import (
     FreeParameter,
     coordinates_of,
@@ -328,41 +326,39 @@ def own_slopes(posterior: Posterior, state: State, whiteners: Sequence[JointWhit
 
 def without_common_scale(linear: LinearModel, effects: Sequence[Chosen], own: list[Array] | None
                          ) -> tuple[LinearModel, list[Array] | None]:
-    """The model and the derivatives by the numbers of its effects (m, n), per run, as dimensional analysis has them
-    (E. Buckingham, Physical Review 4, 1914). A car in which all masses and forces are larger by one factor moves the
-    same, or where forces drive it as if these were smaller; one in which all lengths and forces are, and what moves it,
-    moves as much farther. Differences over steps do not show that exactly, least of all of a mode that little damps, or
-    of dry friction, which sticks and slips: they would seem to measure a size that only the prior knows, or know it
-    better than what was measured. A user's own effects may have units that nobody knows, as a force among the signals
-    has no motion."""
-    prior, numbers, posterior = linear.prior, linear.numbers, linear.posterior
-    if numbers is None or posterior.measures_forces or any(one.file for one in effects):
+    """The model and the derivatives by the numbers of its effects (m, n), per run, without a common scale of all
+    masses and forces but that of the forces that drive a rig: a car in which they are larger by one factor moves the
+    same. Differences over steps do not show that exactly, least of all of a mode that little damps, or of dry friction,
+    which sticks and slips: they would seem to measure a size that only the prior knows, or the force. A force among the
+    signals shows the size."""
+    if linear.numbers is None or linear.posterior.measures_forces:
         return linear, own
-    names, per_log = [*prior.names], [1.0] * len(prior.names)
+    return with_dimensions(linear, effects, own, linear.posterior.size_slopes(linear.state, with_lengths=False))
+
+
+def with_dimensions(linear: LinearModel, effects: Sequence[Chosen], own: list[Array] | None, wanted: Sequence[Array]
+                    ) -> tuple[LinearModel, list[Array] | None]:
+    """The model and the derivatives by the numbers of its effects (m, n), per run, as dimensional analysis has them
+    (E. Buckingham, Physical Review 4, 1914). A user's own effects may have units that nobody knows: there they stay.
+
+    wanted    (1, n) per run, the derivative by the logarithm of all masses and forces together; (2, n): then that by
+              all lengths and forces
+    """
+    if linear.numbers is None or any(one.file for one in effects):
+        return linear, own
+    names, per_log = [*linear.prior.names], [1.0] * len(linear.prior.names)
     for free in free_parameters_of(effects):
         parameter = effects[free.effect].effect.parameters[free.parameter]
         value = effects[free.effect].values[parameter.name]
         names.append(parameter.name)
         per_log.append(value * slope_of(parameter, value))
     by_log = np.array(per_log)[:, None]
-    with_lengths = _frees_all_lengths(posterior, effects)
-    powers = np.array([dimensions_of(name)[: 1 + with_lengths] for name in names], float) * (by_log != 0)
+    powers = np.array([dimensions_of(name)[: len(wanted[0])] for name in names], float) * (by_log != 0)
     share = np.linalg.pinv(powers).T / np.where(by_log == 0, 1.0, by_log)
-    slopes = numbers if own is None else list(map(np.vstack, zip(numbers, own, strict=True)))
-    freed = [one - share @ (powers.T @ (by_log * one) - wanted) for one, wanted in zip(
-        slopes, posterior.size_slopes(linear.state, with_lengths), strict=True)]
+    slopes = linear.numbers if own is None else list(map(np.vstack, zip(linear.numbers, own, strict=True)))
+    freed = [one - share @ (powers.T @ (by_log * one) - right) for one, right in zip(slopes, wanted, strict=True)]
     p = linear.count
     return linear.with_number_slopes([one[:p] for one in freed]), None if own is None else [one[p:] for one in freed]
-
-
-def _frees_all_lengths(posterior: Posterior, effects: Sequence[Chosen]) -> bool:
-    """Whether nothing that stays as it is has a length: on a rig without places, of which no tire lifts off, as gravity
-    stays; laws that were learned have curves, whose lengths stay."""
-    fixed = [(name, value) for one in effects for name, value in one.values.items()
-             if name not in {free.name for free in one.freed}]
-    return (are_on_rig(posterior.runs.runs) and not structure_of(posterior.vehicle).behind_m.any()
-            and not any(one.effect.sought is Sought.NEVER or one.effect.name == "wheel_lift" for one in effects)
-            and not any(value and dimensions_of(name)[1] for name, value in fixed if np.isfinite(value)))
 
 
 def _fine_steps(linear: LinearModel) -> Array:

@@ -4,7 +4,8 @@ On a rig squares are weighed by one level, and the noise of its measured input g
 stops make more of it than of all other noise, and the fit follows it. There the covariance is that of the estimates
 themselves (H. White, Econometrica 50, 1982): of the gradient under the noise as it is, between two inverses of the
 information. The noise of the readings has the residual's power in each band; that of the input is drawn. What measured
-the input has a gain as well: lengths and velocities of effects are known no better than the motion.
+the input has a gain as well: lengths and velocities of effects are known no better than the motion. Differences over
+steps do not show exactly that a larger car under larger forces moves the same; the derivatives are made to.
 
 The numbers of effects differ by many powers of ten (a cubic stiffness has 1e6, a ratio 1), so that the matrix is scaled
 to a diagonal of ones before it is inverted.
@@ -17,11 +18,12 @@ import numpy as np
 
 from logger.arrays import Array
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import own_slopes, range_of, without_common_scale
+from logger.lab.likelihood.map_fit import own_slopes, range_of, with_dimensions
 from logger.runs import are_on_rig
-from logger.vehicle.effect import Chosen
+from logger.simulation.beginning import begins_unknown
+from logger.vehicle.effect import Chosen, Sought
 from logger.vehicle.named_parameters import FreeParameter, coordinates_of, free_parameters_of, read, slope_of
-from logger.vehicle.uncertain import NumberErrors
+from logger.vehicle.uncertain import NumberErrors, dimensions_of
 
 _SCALE = "sprung_mass_kg"
 
@@ -96,8 +98,10 @@ def _covariance(linear: LinearModel) -> Array:
     free = linear.posterior.with_free_gains()
     if free is not linear.posterior:  # what a sensor may be off by, all that it scales is
         linear = LinearModel(free, linear.state, linear.numbers, linear.whiteners)
-    linear, slopes = without_common_scale(linear, linear.state.effects, own_slopes(
-        linear.posterior, linear.state, linear.whiteners))
+    slopes = own_slopes(linear.posterior, linear.state, linear.whiteners)
+    if not linear.posterior.measures_forces:  # which no motion is, as what follows has it
+        linear, slopes = with_dimensions(linear, linear.state.effects, slopes, linear.posterior.size_slopes(
+            linear.state, _frees_all_lengths(linear)))
     information = linear.information(None if slopes is None else linear.whitened(slopes))
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
     known = size > 0
@@ -106,6 +110,19 @@ def _covariance(linear: LinearModel) -> Array:
     if are_on_rig(linear.posterior.runs.runs):
         inverse = inverse @ (information + _scatter(linear, slopes)) @ inverse
     return np.asarray(np.where(np.outer(known, known), inverse, np.diag(np.where(known, 0.0, np.inf))))
+
+
+def _frees_all_lengths(linear: LinearModel) -> bool:
+    """Whether nothing that stays as it is has a length: on a rig without places, which begins at rest and of which no
+    tire lifts off, as gravity stays; laws that were learned have curves, whose lengths stay."""
+    posterior, state = linear.posterior, linear.state
+    fixed = [(name, value) for one in state.effects for name, value in one.values.items()
+             if name not in {free.name for free in one.freed}]
+    car, runs = posterior.car(state.effects, state.logs), posterior.runs.runs
+    return (are_on_rig(runs) and not any(begins_unknown(car, run) for run in runs)
+            and not car.structure.behind_m.any() and all(one.tire_pulls for one in car.laws)
+            and not any(one.effect.sought is Sought.NEVER for one in state.effects)
+            and not any(value and dimensions_of(name)[1] for name, value in fixed if np.isfinite(value)))
 
 
 def _scatter(linear: LinearModel, slopes: list[Array] | None) -> Array:
