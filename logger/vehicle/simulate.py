@@ -167,9 +167,9 @@ class Passage:
         """Elevations under the wheels at the fine instants (M, w) and their means in each step (M - 1, w) [m], counted
         from where the front left wheel begins; then further inputs of the structure, forces last."""
         # A rig's table is the same under all wheels of an axle, wherever that is.
-        stands = np.sign(structure.behind_m) if self.track.timed else (
+        wheels = np.sign(structure.behind_m) if self.track.timed else (
             structure.contact_patch_m, *structure.behind_m, *np.sign(structure.left_m), structure.surface)
-        place = (*stands, structure.actuators, structure.on_base, structure.held)
+        place = (*wheels, structure.actuators, structure.on_base, structure.held)
         known = self._known.get(place)  # another thread may take it out at any time
         if known is None:
             track = self.track.as_it_is(structure.surface, structure.actuators)

@@ -77,7 +77,7 @@ class UnknownNumbers(MeasuredRoad):
     ends: dict[str, tuple[int, int]] = field(default_factory=dict)
     _squares: dict[int, tuple[Posterior, BySquares]] = field(default_factory=dict)
     _ended: dict[frozenset[str], Sequence[_Drawn]] = field(default_factory=dict)
-    _outdone: tuple[Baseline, State] | None = None
+    _reconsidered: tuple[Baseline, State] | None = None
 
     def fitted(self, posterior: Posterior, present: Sequence[Chosen], near: State | None = None) -> Baseline:
         """The model with some effects, fitted from where it is or else from the file's car, and from cars that are
@@ -102,10 +102,10 @@ class UnknownNumbers(MeasuredRoad):
         anchor = self._anchor(by_squares, base.state, 1)
         least = without = by_squares.deviance(anchor)
         known, numbers = np.inf, None
-        if near is not None and self._outdone is not None and self._outdone[0] is base:
-            there = self._outdone[1]
-            if (begun_there := by_squares.at(there.effects, there.logs, there)) is not None:
-                known, best = by_squares.improved(begun_there[1])
+        if near is not None and self._reconsidered is not None and self._reconsidered[0] is base:
+            there = self._reconsidered[1]
+            if (car_there := by_squares.at(there.effects, there.logs, there)) is not None:
+                known, best = by_squares.improved(car_there[1])
                 least = min(known, least)
                 numbers = best.logs if self._shows_the_car(by_squares, anchor, best) else None
         found: list[Screened] = []
@@ -167,7 +167,7 @@ class UnknownNumbers(MeasuredRoad):
         """The model without an effect, fitted from where it is and from several starts."""
         rest, state = effects_without(now.state, name), now.state
         found = self.fitted(now.posterior, rest, now.posterior.state_at(rest, state.logs, state.record, state.size))
-        self._outdone = found, state
+        self._reconsidered = found, state
         return found
 
     @staticmethod
