@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
+from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded, through_points
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 _POINTS = {"curve": (0.5, 0.9, 0.995), "long_curve": (0.5, 0.9, 0.99, 0.999)}
@@ -125,19 +125,10 @@ def force_n(p, at):
         """A force that follows a smooth curve through points on either side of rest."""
         places = sorted({sign * rounded(one) for one in knots if one for sign in (-1, 1)})  # beside rest, which is one
         names = {one: f"force_{number}_n" for number, one in enumerate(places, 1)}
-        at = sorted([*places, 0.0])
-        functions = f"""
-AT = np.array([{', '.join(repr(one) for one in at)}])
-
-
-def force_n(p, at):
-    through = np.array([
-        {', '.join(f'p.{names[one]}' if one in names else '0.0' for one in at)}])
-    return PchipInterpolator(AT, through)(np.clip(at, AT[0], AT[-1]))
-"""
         parameters = tuple(_strength(name, size_n, f"at {one:g} {self.motion.unit}", (0.1,))
                            for one, name in names.items())
-        return self._draft(variant, "follows a curve of", parameters, functions, places[-1], tuple(places))
+        return self._draft(variant, "follows a curve of", parameters, through_points("force_n", names), places[-1],
+                           tuple(places))
 
     def _draft(self, variant: str, does: str, parameters: tuple[Parameter, ...], functions: str, reference: float,
                places: tuple[float, ...]) -> Draft:

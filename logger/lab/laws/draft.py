@@ -266,6 +266,21 @@ class Family(ABC):
         mm". The axle is added by the caller."""
 
 
+def through_points(function: str, names: Mapping[float, str]) -> str:
+    """Text of a function of the parameters and of where it is: a smooth curve through points, of which parameters have
+    these ``names`` by place, and 0 at rest; beyond the points it stays what it is there."""
+    at = sorted([*names, 0.0])
+    return f"""
+AT = np.array([{', '.join(repr(one) for one in at)}])
+
+
+def {function}(p, at):
+    through = np.array([
+        {', '.join(f'p.{names[one]}' if one in names else '0.0' for one in at)}])
+    return PchipInterpolator(AT, through)(np.clip(at, AT[0], AT[-1]))
+"""
+
+
 def rounded(value: float, digits: int = 2) -> float:
     """A number rounded to so many significant digits."""
     return float(f"{value:.{digits}g}")

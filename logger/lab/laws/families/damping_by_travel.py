@@ -5,7 +5,7 @@ the damper with all that is known of it: fluid that goes past the piston through
 these are.
 """
 
-from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded
+from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded, through_points
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
 
@@ -38,24 +38,15 @@ def force_n(p, travel_m, rate_mps):
 
     def _curve(self, count: int, reach_m: float) -> Draft:
         """A damping that follows a curve through so many points on either side of rest."""
-        places = [sign * rounded(reach_m * one / count) for sign in (-1, 1) for one in range(1, count + 1)]
-        names = {one: f"more_{number}_ratio" for number, one in enumerate(sorted(places), 1)}
-        at = sorted([*places, 0.0])
-        functions = f"""
-AT = np.array([{', '.join(repr(one) for one in at)}])
-
-
-def more(p, travel_m):
-    through = np.array([
-        {', '.join(f'p.{names[one]}' if one in names else '0.0' for one in at)}])
-    return PchipInterpolator(AT, through)(np.clip(travel_m, AT[0], AT[-1]))
-"""
+        places = sorted(sign * rounded(reach_m * one / count) for sign in (-1, 1) for one in range(1, count + 1))
+        names = {one: f"more_{number}_ratio" for number, one in enumerate(places, 1)}
         parameters = tuple(Parameter(
-            name, trial := rounded(abs(one) / at[-1]), -1.0, 100.0, 0.0, Scale.LINEAR, (trial,),
+            name, trial := rounded(abs(one) / places[-1]), -1.0, 100.0, 0.0, Scale.LINEAR, (trial,),
             f"damping at {1000 * one:g} mm over that at rest, less 1", step=0.02) for one, name in names.items())
         return self.draft(parameters, "def laws(self, p, laws):\n    return laws.with_force("
-                          "lambda travel_m, rate_mps: more(p, travel_m) * laws.damper(rate_mps))", functions,
-                          variant=f"curve through {len(at)} points", at="loop", reference=at[-1])
+                          "lambda travel_m, rate_mps: more(p, travel_m) * laws.damper(rate_mps))",
+                          through_points("more", names), variant=f"curve through {len(places) + 1} points", at="loop",
+                          reference=places[-1])
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         if draft.variant:
