@@ -333,7 +333,7 @@ def without_common_scale(linear: LinearModel, effects: Sequence[Chosen], own: li
     signals shows the size."""
     if linear.numbers is None or linear.posterior.measures_forces:
         return linear, own
-    return with_dimensions(linear, effects, own, linear.posterior.size_slopes(linear.state, with_lengths=False))
+    return with_dimensions(linear, effects, own, linear.posterior.size_slopes(linear.state))
 
 
 def with_dimensions(linear: LinearModel, effects: Sequence[Chosen], own: list[Array] | None, wanted: Sequence[Array]

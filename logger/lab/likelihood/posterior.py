@@ -187,17 +187,18 @@ class Posterior:
         gain = 1 + self.tolerance.scale
         return self._changed_by(state, self._input_times(gain, gain))
 
-    def size_slopes(self, state: State, with_lengths: bool) -> list[Array]:
+    def size_slopes(self, state: State, carried_gain: Sequence[Array] = ()) -> list[Array]:
         """Derivatives (1, n) of the predictions, per run, by the logarithm of all masses and forces of the car and of
-        its effects together: what forces that drive it do less; ``with_lengths`` (2, n), by that of all lengths and
-        forces, too: what was measured of the motion is larger by it, what the table does with it less."""
+        its effects together: what forces that drive it do less. With the ``carried_gain`` of the state (2, n), by that
+        of all lengths and forces, too: what was measured of the motion is larger by it, what the input does with it
+        less."""
         step = self.tolerance.scale
         slopes = [-one[None] / step for one in self._changed_by(state, self._input_times(1.0, 1 + step))]
-        if not with_lengths:
+        if not carried_gain:
             return slopes
         moves = (one.reshape(-1, run.count) for one, run in zip(state.predictions, self.runs.runs, strict=True))
         return [np.vstack([of_mass, (move - move.mean(axis=1, keepdims=True)).ravel() - driven / step])
-                for of_mass, move, driven in zip(slopes, moves, self.carried_gain(state), strict=True)]
+                for of_mass, move, driven in zip(slopes, moves, carried_gain, strict=True)]
 
     def _input_times(self, table: float, forces: float) -> list[WheelTracks]:
         return [one.times(table, forces) if isinstance(one, Excitation) and (table != 1 or one.forces) else one

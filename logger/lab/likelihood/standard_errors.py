@@ -19,6 +19,7 @@ import numpy as np
 from logger.arrays import Array
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import own_slopes, range_of, with_dimensions
+from logger.lab.likelihood.posterior import Posterior, State
 from logger.runs import are_on_rig
 from logger.simulation.beginning import begins_unknown
 from logger.vehicle.effect import Chosen, Sought
@@ -98,24 +99,24 @@ def _covariance(linear: LinearModel) -> Array:
     free = linear.posterior.with_free_gains()
     if free is not linear.posterior:  # what a sensor may be off by, all that it scales is
         linear = LinearModel(free, linear.state, linear.numbers, linear.whiteners)
-    slopes = own_slopes(linear.posterior, linear.state, linear.whiteners)
-    if not linear.posterior.measures_forces:  # which no motion is, as what follows has it
-        linear, slopes = with_dimensions(linear, linear.state.effects, slopes, linear.posterior.size_slopes(
-            linear.state, _frees_all_lengths(linear)))
+    posterior, state, on_rig = linear.posterior, linear.state, are_on_rig(linear.posterior.runs.runs)
+    slopes, gained = own_slopes(posterior, state, linear.whiteners), posterior.carried_gain(state) if on_rig else []
+    if not posterior.measures_forces:  # which no motion is, as what follows has it
+        linear, slopes = with_dimensions(linear, state.effects, slopes, posterior.size_slopes(
+            state, gained if _frees_all_lengths(posterior, state) else ()))
     information = linear.information(None if slopes is None else linear.whitened(slopes))
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
     known = size > 0
     scale = np.where(known, size, 1.0)
     inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-10, hermitian=True) / np.outer(scale, scale)
-    if are_on_rig(linear.posterior.runs.runs):
-        inverse = inverse @ (information + _scatter(linear, slopes)) @ inverse
+    if on_rig:
+        inverse = inverse @ (information + _scatter(linear, slopes, gained)) @ inverse
     return np.asarray(np.where(np.outer(known, known), inverse, np.diag(np.where(known, 0.0, np.inf))))
 
 
-def _frees_all_lengths(linear: LinearModel) -> bool:
+def _frees_all_lengths(posterior: Posterior, state: State) -> bool:
     """Whether nothing that stays as it is has a length: on a rig without places, which begins at rest and of which no
     tire lifts off, as gravity stays; laws that were learned have curves, whose lengths stay."""
-    posterior, state = linear.posterior, linear.state
     fixed = [(name, value) for one in state.effects for name, value in one.values.items()
              if name not in {free.name for free in one.freed}]
     car, runs = posterior.car(state.effects, state.logs), posterior.runs.runs
@@ -125,17 +126,16 @@ def _frees_all_lengths(linear: LinearModel) -> bool:
             and not any(value and dimensions_of(name)[1] for name, value in fixed if np.isfinite(value)))
 
 
-def _scatter(linear: LinearModel, slopes: list[Array] | None) -> Array:
+def _scatter(linear: LinearModel, slopes: list[Array] | None, gained: Sequence[Array]) -> Array:
     """Covariance of the gradient of a rig's fit by the numbers of the car, and by those whose derivatives (m, n) per
-    run these are, less the information: (p + m, p + m)."""
+    run these are, less the information: (p + m, p + m). ``gained`` is what the input's gain carries (n,) per run."""
     posterior, state = linear.posterior, linear.state
     parts = [one for one in (linear.numbers, slopes) if one is not None]
     columns = linear.without_record_errors([np.vstack(one) for one in zip(*parts, strict=True)])
     # The standard error of a standard deviation by so many draws is 1 / sqrt(2 n) of it, a sixth.
     drawn = [posterior.carried_noise(state, draw) for draw in range(18)]
     found = np.zeros((len(columns[0]), len(columns[0])))
-    pulls, gained = np.zeros((len(drawn), len(found))), posterior.carried_gain(state)
-    gain_pull = np.zeros(len(found))
+    pulls, gain_pull = np.zeros((len(drawn), len(found))), np.zeros(len(found))
     for run, (bands, residual) in enumerate(zip(posterior.bands, posterior.residuals(state), strict=True)):
         carried = np.mean([bands.power(one[run]) for one in drawn], axis=0)
         own, white = bands.scatter_whitener(residual, carried)(columns[run]), linear.whiteners[run](columns[run])
