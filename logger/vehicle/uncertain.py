@@ -21,8 +21,9 @@ from logger.vehicle.vehicle import Vehicle
 _LEAST_VARIANCE = 1e-6
 _HALF_NORMAL = (-float(np.euler_gamma + np.log(2)) / 2, float(np.pi / np.sqrt(8)))
 """Mean and standard deviation of ln |z| of a standard normal z."""
-# Powers of mass and length in units.
-_DIMENSIONS = {"kg": (1, 0), "n": (1, 1), "m": (0, 1), "m2": (0, 2), "m3": (0, 3), "mps2": (0, 1)}
+# Powers of mass, length and time in units.
+_DIMENSIONS = {"kg": (1, 0, 0), "n": (1, 1, -2), "m": (0, 1, 0), "m2": (0, 2, 0), "m3": (0, 3, 0), "s": (0, 0, 1),
+               "s2": (0, 0, 2)}
 _FARTHEST = 1.0  # a size that may be off by more than a factor e is not known at all
 
 
@@ -157,15 +158,6 @@ def not_known(iri_share_std: float) -> str:
 # Of a car of the middle class: sprung mass on each wheel, frequency of its bounce, wheelbase.
 _MASS_KG, _BOUNCE_HZ, _WHEELBASE_M = 350.0, 1.4, 2.7
 _TRAVEL_M = 0.02
-# Powers of force, way and time by the end of a name, the longest ends first.
-_POWERS = {
-    "_n_per_m3": (1, -3, 0), "_n_per_m2": (1, -2, 0), "_n_s2_per_m2": (1, -2, 2), "_n_s_per_m": (1, -1, 1),
-    "_n_per_m": (1, -1, 0), "_m_per_s": (0, 1, -1), "_kg": (1, -1, 2), "_n": (1, 0, 0),
-    "_per_m2": (0, -2, 0),
-}
-_LENGTH = "_m"
-
-
 @dataclass(frozen=True)
 class Scales:
     """How large what happens on a bench is, over what happens in a car: powers of ten of forces, ways and times."""
@@ -211,12 +203,13 @@ def sized(effect: Effect, vehicle: Vehicle, scales: Scales | None = None) -> Eff
     return made
 
 
-def dimensions_of(name: str) -> tuple[int, int]:
-    """The powers of mass and of length in the unit of a number of a car or an effect."""
+def dimensions_of(name: str) -> tuple[int, int, int]:
+    """The powers of mass, length and time in the unit of a number of a car or an effect."""
     above, _, below = name.partition("_per_")
-    powers = [(sign * mass, sign * length) for units, sign in ((above.split("_")[1:], 1), (below.split("_"), -1))
-              for mass, length in (_DIMENSIONS.get(unit, (0, 0)) for unit in units)]
-    return sum(mass for mass, _ in powers), sum(length for _, length in powers)
+    powers = [(sign, _DIMENSIONS[unit]) for units, sign in ((above.split("_")[1:], 1), (below.split("_"), -1))
+              for unit in units if unit in _DIMENSIONS]
+    mass, length, time = (sum(sign * of_unit[at] for sign, of_unit in powers) for at in range(3))
+    return mass, length, time
 
 
 def grows_with_mass(name: str) -> bool:
@@ -241,11 +234,11 @@ def _power_of_ten(ratio: float, parts: int = 1) -> float:
 
 
 def _factor(effect: Effect, name: str, scales: Scales, wheelbase: float) -> float:
-    for end, (of_force, of_way, of_time) in _POWERS.items():
-        if name.endswith(end):
-            return scales.force**of_force * scales.way**of_way * scales.time**of_time
-    if name.endswith(_LENGTH):
+    mass, length, time = dimensions_of(name)
+    if (mass, length, time) == (0, 1, 0):
         return scales.way if isinstance(effect, ForceEffect) else wheelbase
+    if mass or length:
+        return scales.force**mass * scales.way**(length - mass) * scales.time**(time + 2 * mass)
     if name.endswith("_hz") and any(one.name.endswith("_kg") for one in effect.parameters):
         return 1 / scales.time  # of a mass that swings by itself
     return 1.0  # frequencies that resonate are looked for everywhere between bounce and what the recorder keeps

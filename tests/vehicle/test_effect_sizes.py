@@ -45,10 +45,11 @@ def test_a_rig_with_a_wheelbase_has_places_of_its_size() -> None:
     assert sized(shipped_effects()["sensor_offset"], bench).parameters[0].start == pytest.approx(0.03)
 
 
-@pytest.mark.parametrize(("name", "mass", "length"), [
-    ("friction_force_n", 1, 1), ("sprung_mass_kg", 1, 0), ("front.suspension_stiffness_n_per_m", 1, 0),
-    ("pitch_inertia_kg_m2", 1, 2), ("quadratic_damping_n_s2_per_m2", 1, -1), ("clearance_m", 0, 1),
-    ("cubic_stiffness_n_per_m3", 1, -2), ("transition_velocity_m_per_s", 0, 1), ("damping_ratio", 0, 0)])
-def test_the_powers_of_mass_and_length_in_a_unit(name: str, mass: int, length: int) -> None:
-    assert dimensions_of(name) == (mass, length)
+@pytest.mark.parametrize(("name", "mass", "length", "time"), [
+    ("friction_force_n", 1, 1, -2), ("sprung_mass_kg", 1, 0, 0), ("front.suspension_stiffness_n_per_m", 1, 0, -2),
+    ("pitch_inertia_kg_m2", 1, 2, 0), ("quadratic_damping_n_s2_per_m2", 1, -1, 0), ("clearance_m", 0, 1, 0),
+    ("cubic_stiffness_n_per_m3", 1, -2, -2), ("transition_velocity_m_per_s", 0, 1, -1), ("damping_ratio", 0, 0, 0),
+    ("contact_patch_m", 0, 1, 0)])
+def test_the_powers_of_mass_length_and_time_in_a_unit(name: str, mass: int, length: int, time: int) -> None:
+    assert dimensions_of(name) == (mass, length, time)
     assert grows_with_mass(name) == bool(mass)
