@@ -7,16 +7,20 @@ these few numbers, and the state is taken on once. Matrices stand transposed and
 
 Problem: a force by whatever moves at a wheel, with states of its own (``MotionLaw``), fits in no table, and the loop is
 compiled before anybody wrote that law. Solution: each law is compiled by itself, once, to machine code with one and the
-same signature; the loop knows it by its address. Without numba the address is a number in a list. A law's functions are
-distinguished by their code, so they get all that they need as ``p`` and hold nothing else. Their states are stepped by
-an exponential midpoint rule, each with its own decay, the motion at the mean of both ends of the step: exact for a
-state that decays towards something, however quickly (M. Hochbruck, A. Ostermann, Exponential integrators, Acta Numerica
-19, 2010, 2.3).
+same signature, kept on disk too; the loop knows it by its address. Without numba the address is a number in a list. A
+law's functions are distinguished by their code, so they get all that they need as ``p`` and hold nothing else. Their
+states are stepped by an exponential midpoint rule, each with its own decay, the motion at the mean of both ends of the
+step: exact for a state that decays towards something, however quickly (M. Hochbruck, A. Ostermann, Exponential
+integrators, Acta Numerica 19, 2010, 2.3).
 """
 
+import math
 from collections import namedtuple
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cache
+from hashlib import sha256
+from itertools import count
 from types import CodeType, FunctionType
 from typing import Any
 
@@ -28,6 +32,10 @@ from logger.vehicle.laws import MOST_MEMORY, MotionLaw, Seen
 
 try:
     import numba
+    from numba.core.bytecode import FunctionIdentity
+    from numba.core.caching import FunctionCache, IndexDataCacheFile
+    from numba.core.ccallback import CFunc
+    from numba.core.compiler_lock import global_compiler_lock
 except ImportError:
     COMPILED = False
 else:
@@ -96,7 +104,7 @@ def _plain(force: Any, rates: Any, numbers: Any, memory: int) -> Callable[[Array
 def _machine_code(force: Any, rates: Any, numbers: Any, memory: int) -> Any:
     from numba.np.unsafe import ndarray
 
-    count, first = len(numbers._fields), MEMORY_AT
+    size, first = len(numbers._fields), MEMORY_AT
     # Compiled code alone calls these: ways in from Python and C would take half of the time.
     inside: dict[str, Any] = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     compiled: Any = numba.njit(**inside)
@@ -107,7 +115,7 @@ def _machine_code(force: Any, rates: Any, numbers: Any, memory: int) -> Any:
 
     @compiled
     def arguments(given: Any, felt: Any) -> Any:
-        p = numbers(*of_array(numba.carray(given, (count,)), count))
+        p = numbers(*of_array(numba.carray(given, (size,)), size))
         felt = numba.carray(felt, (FELT,))
         return p, all_seen(*of_array(felt[:first], first), of_array(felt[first : first + memory], memory))
 
@@ -122,13 +130,54 @@ def _machine_code(force: Any, rates: Any, numbers: Any, memory: int) -> Any:
         for index in range(memory):
             answers[1 + index] = found[index]
 
-    try:
-        return numba.cfunc(numba.types.void(pointer, pointer, pointer))(
-            force_alone if rates is None else force_and_rates)
-    except numba.core.errors.NumbaError as error:
-        why = next(line for line in str(error).splitlines() if line.strip() and not line.startswith("Failed in"))
-        raise ValueError("expected force and rates to be plain arithmetic and numpy functions of numbers, which can be "
-                         f"compiled: {why}") from None
+    answer: Any = CFunc(force_alone if rates is None else force_and_rates,
+                        numba.core.sigutils.normalize_signature(numba.types.void(pointer, pointer, pointer)), {}, {})
+    said = [all_said(one) for one in (force, rates) if one is not None]
+    with global_compiler_lock:
+        usual = FunctionIdentity._unique_ids
+        try:
+            if None not in said:
+                digest = sha256(repr((said, numbers._fields, memory, Seen._fields)).encode()).hexdigest()[:32]
+                answer._cache = _LawCache(answer._pyfunc, "law-" + digest)
+                # Numba counts from 1 on in each process what it compiles, and of two with one name takes either.
+                FunctionIdentity._unique_ids = count(int(digest, 16))
+            answer.compile()
+        except numba.core.errors.NumbaError as error:
+            why = next(line for line in str(error).splitlines() if line.strip() and not line.startswith("Failed in"))
+            raise ValueError("expected force and rates to be plain arithmetic and numpy functions of numbers, which "
+                             f"can be compiled: {why}") from None
+        finally:
+            FunctionIdentity._unique_ids = usual
+    return answer
+
+
+def all_said(function: FunctionType) -> str | None:
+    """All that decides what a function does, where that is its own code, plain numbers and functions of NumPy."""
+    codes, said = [function.__code__], []
+    for code in codes:
+        codes += [one for one in code.co_consts if isinstance(one, CodeType)]
+        constants = [one for one in code.co_consts if not isinstance(one, CodeType)]
+        named = {name: function.__globals__[name] for name in code.co_names if name in function.__globals__}
+        if not all(isinstance(one, float | int) or one is np or one is math for one in named.values()):
+            return None
+        said.append((code.co_code, constants, code.co_names, code.co_varnames, named))
+    return repr(said)
+
+
+if COMPILED:
+    class _LawCache(FunctionCache):
+        """Keeps machine code in a file of this name, beside that of the loops and like it for this processor alone."""
+
+        def __init__(self, function: Any, name: str) -> None:
+            super().__init__(function)
+            self._cache_file = IndexDataCacheFile(self.cache_path, name, self._impl.locator.get_source_stamp())
+
+        def _index_key(self, sig: Any, codegen: Any) -> Any:
+            return sig, codegen.magic_tuple()
+
+        def save_overload(self, sig: Any, data: Any) -> None:
+            with suppress(OSError):  # a full disk
+                super().save_overload(sig, data)
 
 
 def _code(_context: Any, address: Any, given: Any, first: Any, felt: Any, answers: Any) -> Any:

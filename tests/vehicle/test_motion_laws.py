@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import namedtuple
 from dataclasses import replace
+from itertools import count
 from math import pi, sqrt
 from pathlib import Path
 from types import SimpleNamespace
@@ -282,6 +283,49 @@ def test_a_compiled_law_answers_as_it_is_written() -> None:
     numbers = namedtuple("numbers", sorted(vars(values)))
     stepping_loop._plain(force, rates, numbers, 1)(given[1:], felt, written)  # as it is asked without a compiler
     assert written == pytest.approx(answers, rel=1e-12)
+
+
+SHARE, ARRAY = 1.5, np.array([1.0, 2.0])
+
+
+def shared(p, seen):
+    return SHARE * p.a * seen.rate_mps
+
+
+def doubled(p, seen):
+    return 2.0 * p.a * seen.rate_mps
+
+
+def thrice(p, seen):
+    return 3.0 * p.a * seen.rate_mps
+
+
+def of_array(p, seen):
+    return ARRAY[1] * p.a * seen.rate_mps
+
+
+def test_machine_code_is_kept_of_the_law_that_was_meant(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    numba = pytest.importorskip("numba")
+    from numba.core.bytecode import FunctionIdentity
+
+    monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
+    names = set()
+
+    def answer(law, number: str = "a") -> tuple[float, int]:
+        """Of a process that asks this law first, and whether its code was there."""
+        monkeypatch.setattr(FunctionIdentity, "_unique_ids", count(10**6))
+        made = stepping_loop._machine_code(law, None, namedtuple("numbers", number), 0)
+        names.add(made.native_name)
+        answers = np.zeros(stepping_loop.ANSWERS)
+        stepping_loop.ask(made.address, np.array([10.0]), 0, np.linspace(0, 1, stepping_loop.FELT), answers)
+        return round(answers[0] * (stepping_loop.FELT - 1), 9), made.cache_hits
+
+    assert [answer(law) for law in (doubled, thrice, shared) * 2] == [
+        (20.0, 0), (30.0, 0), (15.0, 0), (20.0, 1), (30.0, 1), (15.0, 1)]
+    assert len(names) == 3
+    monkeypatch.setitem(globals(), "SHARE", 2.5)
+    assert answer(shared) == (25.0, 0)
+    assert [answer(of_array) for _ in range(2)] == [(20.0, 0)] * 2  # what it holds is not said by its text
 
 
 # --- in place of them, linear ones ---
