@@ -338,6 +338,12 @@ class Study:
         return self.name.replace("_", "-")
 
 
+def study(title: str, where: str, how: str, *items: Item, source: str = DISSERTATION
+          ) -> Callable[[Callable[[Workload], Result]], Study]:
+    """Makes a function the study of its name, with these fields of ``Study``."""
+    return lambda run: Study(run.__name__, title, where, how, run, items, source)
+
+
 def studies(shelf: str | None = None) -> dict[str, Study]:
     """All of a shelf, or of all shelves, by the names that people write; the dissertation's in its order."""
     shelves = SHELVES.values() if shelf is None else [SHELVES[shelf]]

@@ -29,7 +29,7 @@ def test_the_shelf_is_whole() -> None:
 def test_the_check_profile_s_printed_values() -> None:
     for at_m, printed in standards.PRINTED_IRI_CHECK_PROFILE:
         assert printed == RUNNING_IRI[round(at_m / 0.25) - 1]
-    values = standards._iri_check_profile(Workload()).values
+    values = standards.iri_check_profile.run(Workload()).values
     assert max(abs(one.ours - one.printed) for one in values[:-1]) < 7e-6
     assert values[-1].word is Word.MISPRINT
     assert values[-1].ours == pytest.approx(5.476206e-3, abs=1e-9)
@@ -48,7 +48,7 @@ def test_the_bursts_are_those_of_the_benchmark_and_agree() -> None:
 
 
 def test_the_gain_is_that_of_the_transfer_function() -> None:
-    for one in standards._golden_car_gain(Workload()).values[2:]:
+    for one in standards.golden_car_gain.run(Workload()).values[2:]:
         assert abs(golden_response(np.array([one.ours]))[0]) == pytest.approx(0.5, abs=2e-3)
 
 

@@ -29,13 +29,13 @@ from logger.studies.study import (
     Picture,
     Result,
     Statement,
-    Study,
     Table,
     Value,
     Word,
     Workload,
     about,
     alike,
+    study,
 )
 from logger.vehicle.models import GOLDEN_CAR, quarter_car
 from logger.vehicle.modes import undamped_frequencies_hz
@@ -43,7 +43,13 @@ from logger.vehicle.modes import undamped_frequencies_hz
 _SPACING_M_T2_2 = 0.05
 
 
-def _t2_2(effort: Workload) -> Result:
+@study("The classes of ISO 8608, and roads of each", "Table 2.2, section 2.2.1",
+       "The limits are those at which ridelog changes the class of a road; roads of 1 km are generated at each class's "
+       "geometric mean and classified from their elevations alone.",
+       Item("Table 2.2", Word.MISPRINT,
+            "All limits agree; the published unit should be 1e-6 m2 per cycle/m, which is cm3."),
+       Item("Fig 2.5", Word.AGREES, "The plotted limits are those of the table, at waviness 2."))
+def table_2_2(effort: Workload) -> Result:
     # Class, lower limit, geometric mean, upper limit [cm3].
     printed = (("A", None, 16, 32), ("B", 32, 64, 128), ("C", 128, 256, 512), ("D", 512, 1_024, 2_048),
                ("E", 2_048, 4_096, 8_192), ("F", 8_192, 16_384, 32_768), ("G", 32_768, 65_536, 131_072),
@@ -97,20 +103,18 @@ def _limit(smoother: tuple[str, float], rougher: tuple[str, float]) -> float:
     return high
 
 
-T2_2 = Study("table_2_2", "The classes of ISO 8608, and roads of each", "Table 2.2, section 2.2.1",
-              "The limits are those at which ridelog changes the class of a road; roads of 1 km are generated at each "
-              "class's geometric mean and classified from their elevations alone.", _t2_2,
-              items=(Item("Table 2.2", Word.MISPRINT,
-                          "All limits agree; the published unit should be 1e-6 m2 per cycle/m, which is cm3."),
-                     Item("Fig 2.5", Word.AGREES, "The plotted limits are those of the table, at waviness 2.")))
-
-
 PRINTED_RANGES = (("airport runways and superhighways", 0.25, 1.75), ("new pavements", 1.50, 3.25),
                   ("older pavements", 2.25, 5.75), ("maintained unpaved roads", 3.25, 10.00),
                   ("damaged pavements", 4.00, 10.75), ("rough unpaved roads", 8.00, 20.00))
 
 
-def _t2_3(effort: Workload) -> Result:
+@study("IRI of kinds of road, and how they ride", "Table 2.3, section 2.2.2.3",
+       "ridelog describes each IRI from 0 to 25 m/km in steps of 0.001; the values at which the description changes "
+       "are compared with the published ones.",
+       *alike(("Table 2.3", "Fig 2.16"), Word.AGREES, "Each kind of road begins and ends at the published IRI."),
+       Item("Table 2.4", Word.AGREES, "The description of the ride changes at the published marks."),
+       Item("2.2.2.3 targets", Word.AGREES, "Good and fair roads end at the targets of 2006 and 2002."))
+def table_2_3(effort: Workload) -> Result:
     # Marks of Table 2.4's scale at which the second to fifth descriptions begin [m/km].
     printed_marks = (4.0, 6.0, 8.0, 10.0)
     # Upper ends [m/km]: the targets of 2006 and of 2002, 95 and 170 in/mi.
@@ -145,20 +149,15 @@ def _t2_3(effort: Workload) -> Result:
     return Result((rides,), verdict, (picture,), tuple(values))
 
 
-T2_3 = Study("table_2_3", "IRI of kinds of road, and how they ride", "Table 2.3, section 2.2.2.3",
-              "ridelog describes each IRI from 0 to 25 m/km in steps of 0.001; the values at which the description "
-              "changes are compared with the published ones.", _t2_3,
-              items=(*alike(("Table 2.3", "Fig 2.16"), Word.AGREES,
-                            "Each kind of road begins and ends at the published IRI."),
-                     Item("Table 2.4", Word.AGREES, "The description of the ride changes at the published marks."),
-                     Item("2.2.2.3 targets", Word.AGREES, "Good and fair roads end at the targets of 2006 and 2002.")))
-
-
 CLASSES = ("B", "D")
 PROFILES, SPECTRA = {"B": "Fig 2.6", "D": "Fig 2.8"}, {"B": "Fig 2.7", "D": "Fig 2.9"}
 
 
-def _f2_7(effort: Workload) -> Result:
+@study("Spectra of a smooth and a rough road, raw and smoothed", "Fig 2.7, section 2.2.1",
+       "Random roads of 1 km at the geometric means of classes B and D, as the captions have them.",
+       *alike(PROFILES.values(), Word.AGREES, "A road generated for the caption's class is classified as that class."),
+       *alike(SPECTRA.values(), Word.AGREES, "The spectra fall, differ and become smooth as the text describes."))
+def fig_2_7(effort: Workload) -> Result:
     spacing_m = 0.05
     bands_cpm = (0.011, 2.0)
     rows: list[tuple[Cell, ...]] = []
@@ -209,14 +208,6 @@ def _f2_7(effort: Workload) -> Result:
     return Result((table,), verdict, pictures, tuple(values))
 
 
-F2_7 = Study("fig_2_7", "Spectra of a smooth and a rough road, raw and smoothed", "Fig 2.7, section 2.2.1",
-             "Random roads of 1 km at the geometric means of classes B and D, as the captions have them.", _f2_7,
-             items=(*alike(PROFILES.values(), Word.AGREES,
-                           "A road generated for the caption's class is classified as that class."),
-                    *alike(SPECTRA.values(), Word.AGREES,
-                           "The spectra fall, differ and become smooth as the text describes.")))
-
-
 NAMES = ("f1", "f2", "f3", "f4", "Q4", "f5", "Q5", "f6", "Q6")
 PRINTED_T2_7: tuple[tuple[Weighting, tuple[float | None, ...]], ...] = (
     (WK, (0.4, 100, 12.5, 12.5, 0.63, 2.37, 0.91, 3.35, 0.91)),
@@ -228,7 +219,11 @@ PRINTED_T2_7: tuple[tuple[Weighting, tuple[float | None, ...]], ...] = (
 )
 
 
-def _t2_7(effort: Workload) -> Result:
+@study("Parameters of the six frequency weightings", "Table 2.7, section 2.3.4.1",
+       "The parameters in ridelog's weighting files, one by one.",
+       Item("Table 2.7", Word.AGREES, "Every parameter of Wk, Wd and Wf agrees."),
+       Item("Table 2.8", Word.AGREES, "Every parameter of Wc, We and Wj agrees."))
+def table_2_7(effort: Workload) -> Result:
     rows: list[tuple[Cell, ...]] = []
     values: list[Value] = []
     for weighting, printed in effort.each(PRINTED_T2_7):
@@ -248,13 +243,11 @@ def _t2_7(effort: Workload) -> Result:
     return Result((absent,), verdict, (), tuple(values))
 
 
-T2_7 = Study("table_2_7", "Parameters of the six frequency weightings", "Table 2.7, section 2.3.4.1",
-              "The parameters in ridelog's weighting files, one by one.", _t2_7,
-              items=(Item("Table 2.7", Word.AGREES, "Every parameter of Wk, Wd and Wf agrees."),
-                     Item("Table 2.8", Word.AGREES, "Every parameter of Wc, We and Wj agrees.")))
-
-
-def _f2_13(effort: Workload) -> Result:
+@study("Response of the IRI to each wavelength", "Fig 2.13, section 2.2.2.1",
+       "Computed for the Golden Car as a continuous system, without the moving average, as in the figure.",
+       Item("Fig 2.13", Word.MISPRINT, "The text swaps the two wave numbers: at 0.065 cycle/m the body bounces, at "
+                                       "0.42 the wheel hops; the curve itself agrees."))
+def fig_2_13(effort: Workload) -> Result:
     printed_peaks_cpm = (0.065, 0.42)
     printed_peaks_hz = (1.44, 9.33)
     near_share = 0.05  # as near as the top of a broad hump is read off a figure
@@ -281,18 +274,18 @@ def _f2_13(effort: Workload) -> Result:
     return Result((), verdict, (picture,), values)
 
 
-F2_13 = Study("fig_2_13", "Response of the IRI to each wavelength", "Fig 2.13, section 2.2.2.1",
-              "Computed for the Golden Car as a continuous system, without the moving average, as in the figure.",
-              _f2_13,
-              items=(Item("Fig 2.13", Word.MISPRINT,
-                          "The text swaps the two wave numbers: at 0.065 cycle/m the body bounces, at 0.42 the wheel "
-                          "hops; the curve itself agrees."),))
-
-
 PRINCIPAL, ADDITIONAL = ("wk", "wd", "wf"), ("wc", "we", "wj")
 
 
-def _f2_18(effort: Workload) -> Result:
+@study("Curves of the six frequency weightings", "Fig 2.18, section 2.3.4.1",
+       "The magnitude of the formulas of ISO 2631-1 Annex A, which ridelog applies to whole records.",
+       Item("Fig 2.18", Word.AGREES,
+            "The principal weightings agree with the standard's factors to the published digit."),
+       Item("Fig 2.19", Word.AGREES,
+            "The additional weightings are those of Eq 2.13 to 2.15 with the parameters of Table 2.8."),
+       Item("Eq 2.16", Word.MISPRINT,
+            "Its denominator has f5 and Q5 where it needs f6 and Q6, so it is 1 at all frequencies."))
+def fig_2_18(effort: Workload) -> Result:
     # Factors of ISO 2631-1 Table 3 at frequencies [Hz]; the dissertation prints the curves only.
     standard = ((WK, ((1.0, 0.482), (4.0, 0.967), (8.0, 1.036), (31.5, 0.405))),
                 (WD, ((1.0, 1.011), (4.0, 0.512), (31.5, 0.0632))),
@@ -349,17 +342,12 @@ def _second_order(f_hz: float, corner_hz: float, q: float) -> float:
     return sqrt(ratio**2 + ratio * (1 / q**2 - 2) + 1)
 
 
-F2_18 = Study("fig_2_18", "Curves of the six frequency weightings", "Fig 2.18, section 2.3.4.1",
-              "The magnitude of the formulas of ISO 2631-1 Annex A, which ridelog applies to whole records.", _f2_18,
-              items=(Item("Fig 2.18", Word.AGREES,
-                          "The principal weightings agree with the standard's factors to the published digit."),
-                     Item("Fig 2.19", Word.AGREES,
-                          "The additional weightings are those of Eq 2.13 to 2.15 with the parameters of Table 2.8."),
-                     Item("Eq 2.16", Word.MISPRINT,
-                          "Its denominator has f5 and Q5 where it needs f6 and Q6, so it is 1 at all frequencies.")))
-
-
-def _f2_20(effort: Workload) -> Result:
+@study("The health guidance caution zone", "Fig 2.20, section 2.3.5",
+       "The limits of the zone in ridelog, for exposures from a minute to a day; the doses follow from ISO 2631-1 Eq "
+       "B.3.",
+       Item("Fig 2.20", Word.MISPRINT,
+            "The text swaps the doses of the two lines: 17 is the upper one, 8.5 the lower."))
+def fig_2_20(effort: Workload) -> Result:
     printed_shaded_hours = (4.0, 8.0)
     hours_shown = (1 / 60, 1 / 6, 0.5, 1.0, 2.0, 4.0, 6.0, 8.0, 24.0)
     dose_per_rms = 1.4  # the estimated dose of ISO 2631-1, Eq B.3
@@ -392,11 +380,4 @@ def _f2_20(effort: Workload) -> Result:
                       "two dashed lines for n = 2 and two dotted ones for n = 4, shaded between 4 and 8 hours")
     return Result((table,), verdict, (picture,), values)
 
-
-F2_20 = Study("fig_2_20", "The health guidance caution zone", "Fig 2.20, section 2.3.5",
-              "The limits of the zone in ridelog, for exposures from a minute to a day; the doses follow from ISO "
-              "2631-1 Eq B.3.", _f2_20,
-              items=(Item("Fig 2.20", Word.MISPRINT,
-                          "The text swaps the doses of the two lines: 17 is the upper one, 8.5 the lower."),))
-
-STUDIES = (T2_2, T2_3, F2_7, T2_7, F2_13, F2_18, F2_20)
+STUDIES = (table_2_2, table_2_3, fig_2_7, table_2_7, fig_2_13, fig_2_18, fig_2_20)

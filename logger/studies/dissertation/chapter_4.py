@@ -54,13 +54,13 @@ from logger.studies.study import (
     Picture,
     Result,
     Statement,
-    Study,
     Table,
     Value,
     Word,
     Workload,
     about,
     alike,
+    study,
 )
 from logger.units import MPH_MPS, STANDARD_GRAVITY_MPS2
 from logger.vehicle.models import GOLDEN_CAR, quarter_car, structure_of
@@ -71,7 +71,11 @@ COLUMNS = ("motion", "published [Hz] .1f", "undamped, coupled [Hz] .3f", "spring
            "damped, coupled [Hz] .3f", "published damping .2f", "in series, damping .3f", "coupled, damping .3f")
 
 
-def _t4_1(effort: Workload) -> Result:
+@study("Natural frequencies of the quarter car (the Golden Car)", "Table 4.1, section 4.3.3",
+       "The eigenvalues of Table 4.1's car.",
+       Item("Table 4.1", Word.AGREES,
+            "The frequencies agree to the last published digit, the damping ratio within 0.005."))
+def table_4_1(effort: Workload) -> Result:
     printed_hz = (1.2, 11.0)
     car = quarter_car(GOLDEN_CAR)
     (rows,) = (quoted(car, ("body", "wheel"), printed_hz, (0.40, None)) for _ in effort.each(range(1)))
@@ -111,13 +115,11 @@ def quoted(car: Structure, names: tuple[str, ...], printed_hz: tuple[float | Non
                      strict=True))
 
 
-T4_1 = Study("table_4_1", "Natural frequencies of the quarter car (the Golden Car)", "Table 4.1, section 4.3.3",
-              "The eigenvalues of Table 4.1's car.", _t4_1,
-              items=(Item("Table 4.1", Word.AGREES,
-                          "The frequencies agree to the last published digit, the damping ratio within 0.005."),))
-
-
-def _t4_2(effort: Workload) -> Result:
+@study("Natural frequencies of the half car (RAV4)", "Table 4.2, section 4.3.3",
+       "The eigenvalues of Table 4.2's car.",
+       Item("Table 4.2", Word.MISPRINT,
+            "Frequencies and damping agree; the mass does not follow from Eq 4.36, and the inertia's unit is kg m2."))
+def table_4_2(effort: Workload) -> Result:
     printed_hz = (1.1, 11.0)
     printed_mass_kg = 875.0
     names, (bounce_hz, hop_hz) = ("body bounces", "body pitches", "wheels", "wheels"), printed_hz
@@ -136,17 +138,13 @@ def _t4_2(effort: Workload) -> Result:
     return Result((Table("Vibrations of the half car", COLUMNS, rows),), verdict, (), values)
 
 
-T4_2 = Study("table_4_2", "Natural frequencies of the half car (RAV4)", "Table 4.2, section 4.3.3",
-              "The eigenvalues of Table 4.2's car.", _t4_2,
-              items=(Item("Table 4.2", Word.MISPRINT,
-                          "Frequencies and damping agree; the mass does not follow from Eq 4.36, and the inertia's "
-                          "unit is kg m2."),))
-
-
 PRINTED_T4_3 = (("A", 32.0, 3.05), ("B", 128.0, 6.09), ("C", 512.0, 12.19), ("D", 2048.0, 24.37))
 
 
-def _t4_3(effort: Workload) -> Result:
+@study("Degree of roughness and IRI, and Eq 4.39", "Table 4.3, section 4.3.4",
+       "Random roads of ISO 8608 as in the source, of 1 km; exact IRI of ASTM E1926.",
+       Item("Table 4.3", Word.AGREES, "The relation agrees within the choice of random roads."))
+def table_4_3(effort: Workload) -> Result:
     length_m, spacing_m = 1000.0, 0.05
     roads = effort.count(60, 4)
     # One seed is one set of phases: the roads of all classes are alike but for their level.
@@ -179,15 +177,18 @@ def _t4_3(effort: Workload) -> Result:
     return Result((table,), verdict, (picture,), values)
 
 
-T4_3 = Study("table_4_3", "Degree of roughness and IRI, and Eq 4.39", "Table 4.3, section 4.3.4",
-              "Random roads of ISO 8608 as in the source, of 1 km; exact IRI of ASTM E1926.", _t4_3,
-              items=(Item("Table 4.3", Word.AGREES, "The relation agrees within the choice of random roads."),))
-
-
 _FIGURES = {16.0: ("Fig 4.3", "Fig 4.5"), 256.0: ("Fig 4.4", "Fig 4.5")}
 
 
-def _f4_3(effort: Workload) -> Result:
+@study("Generated roads and their r.m.s. elevation", "Fig 4.3, section 4.2.2",
+       "Random roads of 1 km; the published comparison with a figure of Da Silva (2004) has no numbers, so those of "
+       "ridelog are compared with the sum of the amplitudes of Eq 4.2, worked out by hand.",
+       Item("Fig 4.3", Word.AGREES, "A generated road of 16 cm3 has the r.m.s. elevation of Eq 4.2 and is of class A."),
+       Item("Fig 4.4", Word.MISPRINT, "A road of 256 cm3 is of class C; 4.3.4 calls class D poor."),
+       Item("Fig 4.5", Word.AGREES,
+            "The mean elevations are those of Eq 4.2, in proportion to the root of the degree of roughness."),
+       Item("Eq 4.1", Word.MISPRINT, "Its argument lacks 2 pi, which Appendix A has: n is in cycle/m."))
+def fig_4_3(effort: Workload) -> Result:
     printed = ((16.0, "very good"), (256.0, "poor"))
     printed_poor_cm3 = (512.0, 2048.0)  # Class D, a poor road by 4.3.4.
     gd_cm3 = (1.0, 4.0, 16.0, 64.0, 256.0, 1024.0)
@@ -246,19 +247,12 @@ def _rms_m(gd_n0_cm3: float) -> float:
                          * (1 / iso8608.LOWEST_CPM - 1 / iso8608.HIGHEST_CPM)))
 
 
-F4_3 = Study("fig_4_3", "Generated roads and their r.m.s. elevation", "Fig 4.3, section 4.2.2",
-              "Random roads of 1 km; the published comparison with a figure of Da Silva (2004) has no numbers, so "
-              "those of ridelog are compared with the sum of the amplitudes of Eq 4.2, worked out by hand.", _f4_3,
-              items=(Item("Fig 4.3", Word.AGREES,
-                          "A generated road of 16 cm3 has the r.m.s. elevation of Eq 4.2 and is of class A."),
-                     Item("Fig 4.4", Word.MISPRINT, "A road of 256 cm3 is of class C; 4.3.4 calls class D poor."),
-                     Item("Fig 4.5", Word.AGREES,
-                          "The mean elevations are those of Eq 4.2, in proportion to the root of the degree of "
-                          "roughness."),
-                     Item("Eq 4.1", Word.MISPRINT, "Its argument lacks 2 pi, which Appendix A has: n is in cycle/m.")))
-
-
-def _f4_16(effort: Workload) -> Result:
+@study("IRI of 400 random roads by their degree of roughness", "Fig 4.16, section 4.3.4",
+       "Four sets of 100 random roads of 2 to 4096 cm3 as in the source, each with phases of its own; exact IRI of "
+       "ASTM E1926.",
+       *alike(("Fig 4.16", "Fig 4.17"), Word.AGREES,
+              "The power law through the roads agrees with Eq 4.39 within their random scatter."))
+def fig_4_16(effort: Workload) -> Result:
     printed_power = 0.5
     range_cm3 = (2.0, 4096.0)
     sets, length_m, spacing_m = 4, 500.0, 0.1
@@ -300,14 +294,11 @@ def _power_law(gd: np.ndarray, iri_m_per_km: np.ndarray) -> tuple[float, float]:
     return float(power), float(np.exp(level))
 
 
-F4_16 = Study("fig_4_16", "IRI of 400 random roads by their degree of roughness", "Fig 4.16, section 4.3.4",
-              "Four sets of 100 random roads of 2 to 4096 cm3 as in the source, each with phases of its own; exact IRI "
-              "of ASTM E1926.", _f4_16,
-              items=alike(("Fig 4.16", "Fig 4.17"), Word.AGREES,
-                          "The power law through the roads agrees with Eq 4.39 within their random scatter."))
-
-
-def _f4_18(effort: Workload) -> Result:
+@study("IRI of roads generated for a given IRI", "Fig 4.18, section 4.3.4",
+       "Two sets of random roads of 500 m for an IRI of 1 to 20 m/km by Eq 4.40; exact IRI in place of ProVAL.",
+       Item("Fig 4.18", Word.AGREES,
+            "Roads generated for an IRI have it, within the random scatter of roads of that length."))
+def fig_4_18(effort: Workload) -> Result:
     wanted_m_per_km = tuple(float(one) for one in range(1, 21))
     length_m, spacing_m = 500.0, 0.1
     wanted = np.array(effort.some(wanted_m_per_km, 10))
@@ -337,13 +328,6 @@ def _f4_18(effort: Workload) -> Result:
     return Result((table,), verdict, (picture,), values)
 
 
-F4_18 = Study(
-    "fig_4_18", "IRI of roads generated for a given IRI", "Fig 4.18, section 4.3.4",
-    "Two sets of random roads of 500 m for an IRI of 1 to 20 m/km by Eq 4.40; exact IRI in place of ProVAL.", _f4_18,
-    items=(Item("Fig 4.18", Word.AGREES, "Roads generated for an IRI have it, within the random scatter of roads of "
-                                         "that length."),))
-
-
 PRINTED_PERCENT = {
     MASS: ((0.96, 2.04, 1.96, 1.95, 1.91), (1.43, 1.20, 1.12, 1.45, 0.94), (1.05, 0.68, 0.18, 0.54, 0.67),
            (1.11, 1.14, 1.05, 1.07, 0.84), (1.93, 1.92, 2.19, 1.98, 2.40)),
@@ -357,7 +341,12 @@ NAMES = {MASS: "sprung mass (Table 4.4)", FRONT: "front stiffness (Table 4.5)", 
 _TYPICAL = {MASS: 800.0, FRONT: 22_000.0, REAR: 22_000.0}
 
 
-def _t4_4(effort: Workload) -> Result:
+@study("Mass and both stiffnesses together, from 25 starts", "Table 4.4, section 4.4.4",
+       "Simulated as in the source: the half car of Table 4.2 over the bump of 5.5.2 at 16.1 km/h, on a road of IRI 5 "
+       "m/km that the fit does not know; sensor noise 0.05 m/s2 (the source names none).",
+       *alike(("Table 4.4", "Table 4.5", "Table 4.6"), Word.BETTER,
+              "From every start ridelog ends at one estimate; the published errors differ."))
+def table_4_4(effort: Workload) -> Result:
     start_masses_kg = (700.0, 800.0, 900.0, 1000.0, 1100.0)
     start_rates_n_per_m = (20_000.0, 21_250.0, 22_500.0, 23_750.0, 25_000.0)
     masses = effort.some(list(enumerate(start_masses_kg)))
@@ -420,14 +409,12 @@ def _scatter(words: str, name: str, draws: Sequence[tuple[Fit, ...]]) -> list[tu
     return rows
 
 
-T4_4 = Study("table_4_4", "Mass and both stiffnesses together, from 25 starts", "Table 4.4, section 4.4.4",
-             "Simulated as in the source: the half car of Table 4.2 over the bump of 5.5.2 at 16.1 km/h, on a road of "
-             "IRI 5 m/km that the fit does not know; sensor noise 0.05 m/s2 (the source names none).", _t4_4,
-             items=alike(("Table 4.4", "Table 4.5", "Table 4.6"), Word.BETTER, "From every start ridelog ends at one "
-                         "estimate; the published errors differ."))
-
-
-def _f4_19(effort: Workload) -> Result:
+@study("A bump's input and output in windows of 15 and 100 m", "Fig 4.19, section 4.4.1.1",
+       "Simulated as in the source: the bump of 5.5.2 (the text gives no size) at 16.1 km/h on a road of IRI 5 m/km "
+       "that the input leaves out; sensor noise 0.05 m/s2.",
+       *alike(("Fig 4.19", "Fig 4.20"), Word.NOT_REPRODUCIBLE,
+              "The bump, speed and road of the figures are not published; the simulated response is as described."))
+def fig_4_19(effort: Workload) -> Result:
     windows_m = (15.0, 100.0)
     bump_at_m = 5.0
     bump_ends_m = 15.0  # both axles are over it and the body has swung out
@@ -474,14 +461,13 @@ def _f4_19(effort: Workload) -> Result:
     return Result((table,), verdict, tuple(pictures), tuple(values))
 
 
-F4_19 = Study("fig_4_19", "A bump's input and output in windows of 15 and 100 m", "Fig 4.19, section 4.4.1.1",
-              "Simulated as in the source: the bump of 5.5.2 (the text gives no size) at 16.1 km/h on a road of IRI 5 "
-              "m/km that the input leaves out; sensor noise 0.05 m/s2.", _f4_19,
-              items=alike(("Fig 4.19", "Fig 4.20"), Word.NOT_REPRODUCIBLE, "The bump, speed and road of the figures "
-                          "are not published; the simulated response is as described."))
-
-
-def _f4_21(effort: Workload) -> Result:
+@study("Mass from windows of 5 to 100 m", "Fig 4.21, section 4.4.1.1",
+       "Simulated as in the source: one bump (of 5.5.2; the text gives no size) at the start of the window, 16.1 km/h, "
+       "on a road of IRI 5 m/km that the fit does not know.",
+       Item("Fig 4.21", Word.NOT_REPRODUCIBLE,
+            "The size of the bump and the road are not published; in the simulation the window hardly matters once "
+            "both axles are over the bump, as the text says."))
+def fig_4_21(effort: Workload) -> Result:
     windows_m = tuple(float(end) for end in range(5, 101, 5))
     very_close = 0.02  # two standard errors of ours on such a road are twice that
     whole = record_of(bump(1.0), BUMP_MPS, (windows_m[-1] + 1) / BUMP_MPS, Conditions(iri_m_per_km=5.0))
@@ -515,15 +501,12 @@ def _worst(mass_kg: np.ndarray, chosen: np.ndarray) -> float:
     return float(max(mass_kg[chosen].tolist(), key=lambda one: abs(one - TRUTH[MASS])))
 
 
-F4_21 = Study("fig_4_21", "Mass from windows of 5 to 100 m", "Fig 4.21, section 4.4.1.1",
-              "Simulated as in the source: one bump (of 5.5.2; the text gives no size) at the start of the window, "
-              "16.1 km/h, on a road of IRI 5 m/km that the fit does not know.", _f4_21,
-              items=(Item("Fig 4.21", Word.NOT_REPRODUCIBLE,
-                          "The size of the bump and the road are not published; in the simulation the window hardly "
-                          "matters once both axles are over the bump, as the text says."),))
-
-
-def _f4_22(effort: Workload) -> Result:
+@study("Mass from 20 starts, and from 300 to 3000 kg", "Fig 4.22, section 4.4.1.2",
+       "Simulated as in the source: one bump (of 5.5.2; the text gives no size) at 16.1 km/h on a road of IRI 5 m/km "
+       "that the fit does not know.",
+       Item("Fig 4.22", Word.NOT_REPRODUCIBLE, "The size of the bump and the road are not published; in the simulation "
+                                               "all starts end at one mass, within the published 6 %."))
+def fig_4_22(effort: Workload) -> Result:
     printed_starts_kg = tuple(np.linspace(700, 1100, 20).tolist())
     printed_within_percent = 6.0
     wider_kg = (300.0, 400.0, 550.0, 1500.0, 2000.0, 3000.0)
@@ -552,15 +535,11 @@ def _f4_22(effort: Workload) -> Result:
     return Result((table,), verdict, (picture,), values)
 
 
-F4_22 = Study("fig_4_22", "Mass from 20 starts, and from 300 to 3000 kg", "Fig 4.22, section 4.4.1.2",
-              "Simulated as in the source: one bump (of 5.5.2; the text gives no size) at 16.1 km/h on a road of IRI 5 "
-              "m/km that the fit does not know.", _f4_22,
-              items=(Item("Fig 4.22", Word.NOT_REPRODUCIBLE,
-                          "The size of the bump and the road are not published; in the simulation all starts end at "
-                          "one mass, within the published 6 %."),))
-
-
-def _f4_25(effort: Workload) -> Result:
+@study("Peak acceleration by height and width of a bump", "Fig 4.25, section 4.4.2",
+       "Simulated as in the source: half car of Table 4.2, 16.1 km/h, no roughness, no noise.",
+       Item("Fig 4.25", Word.AGREES, "A higher bump gives a larger peak, a wider one a smaller, as published; the text "
+                                     "gives no numbers for the figure."))
+def fig_4_25(effort: Workload) -> Result:
     heights_m = (0.1016, 0.1270, 0.1524, 0.1778, 0.2032)
     widths_m = (1.83, 2.13, 2.44, 2.74, 3.05, 3.35)
     heights, widths = effort.some(heights_m), effort.some(widths_m)
@@ -590,17 +569,16 @@ def _peak(height_m: float, width_m: float) -> float:
     return float(np.abs(record.measured_mps2).max())
 
 
-F4_25 = Study("fig_4_25", "Peak acceleration by height and width of a bump", "Fig 4.25, section 4.4.2",
-              "Simulated as in the source: half car of Table 4.2, 16.1 km/h, no roughness, no noise.", _f4_25,
-              items=(Item("Fig 4.25", Word.AGREES,
-                          "A higher bump gives a larger peak, a wider one a smaller, as published; the text gives no "
-                          "numbers for the figure."),))
-
-
 _BUMP_AT_M_F4_27 = 8.0
 
 
-def _f4_27(effort: Workload) -> Result:
+@study("Error of the mass by the assumed height and width of a bump", "Fig 4.27 (and 4.26), section 4.4.3",
+       "Simulated as in the source: a bump of 150 mm by 2.60 m at 16.1 km/h, no roughness; sensor noise 0.05 m/s2.",
+       Item("Fig 4.26", Word.AGREES, "A fit of the mass alone shows the published valley."),
+       Item("Fig 4.27", Word.BETTER, "A fit of height, width and mass together finds them within a fraction of a per "
+                                     "cent; a fit of the mass alone has many answers."),
+       Item("4.4.3 smallest height", Word.MISPRINT, "3 in is 76.2 mm, not 72.2."))
+def fig_4_27(effort: Workload) -> Result:
     heights_m = tuple(round(0.0254 * inches, 4) for inches in np.arange(3, 9.01, 0.5).tolist())
     widths_m = tuple(round(0.3048 * feet, 3) for feet in np.arange(6, 11.01, 0.5).tolist())
     printed_limit_percent = 50.0
@@ -655,18 +633,11 @@ def _error_percent(record: Run, height_m: float, width_m: float) -> float:
     return error_percent(fitted(record, {MASS: TRUTH[MASS]}, False, road), MASS)
 
 
-F4_27 = Study("fig_4_27", "Error of the mass by the assumed height and width of a bump",
-              "Fig 4.27 (and 4.26), section 4.4.3",
-              "Simulated as in the source: a bump of 150 mm by 2.60 m at 16.1 km/h, no roughness; sensor noise 0.05 "
-              "m/s2.", _f4_27,
-              items=(Item("Fig 4.26", Word.AGREES, "A fit of the mass alone shows the published valley."),
-                     Item("Fig 4.27", Word.BETTER,
-                          "A fit of height, width and mass together finds them within a fraction of a per cent; a fit "
-                          "of the mass alone has many answers."),
-                     Item("4.4.3 smallest height", Word.MISPRINT, "3 in is 76.2 mm, not 72.2.")))
-
-
-def _f4_30(effort: Workload) -> Result:
+@study("Input and output of a bridge's step", "Fig 4.30, section 4.4.5",
+       "Simulated: the car of Table 4.2 over a step of 38.1 mm at 48.3 km/h, no roughness, no noise.",
+       Item("Fig 4.30", Word.NOT_REPRODUCIBLE,
+            "Height and speed of the figure are not published; those of Fig 4.31 are simulated."))
+def fig_4_30(effort: Workload) -> Result:
     step_at_m = 10.0
     still = 0.02  # of the peak: the body has swung out
     (record,) = (record_of(bridge(step_at_m), BRIDGE_MPS, 4.0, Conditions(noise_mps2=0.0))
@@ -703,16 +674,17 @@ def _blow_s(accel: Array, time_s: Array, part: npt.NDArray[np.bool_]) -> float:
     return float(time_s[part][np.abs(accel[part]).argmax()])
 
 
-F4_30 = Study("fig_4_30", "Input and output of a bridge's step", "Fig 4.30, section 4.4.5",
-              "Simulated: the car of Table 4.2 over a step of 38.1 mm at 48.3 km/h, no roughness, no noise.", _f4_30,
-              items=(Item("Fig 4.30", Word.NOT_REPRODUCIBLE,
-                          "Height and speed of the figure are not published; those of Fig 4.31 are simulated."),))
-
-
 _STEP_AT_M_F4_31 = 20.0
 
 
-def _f4_31(effort: Workload) -> Result:
+@study("Mass against the assumed height of a bridge's step", "Fig 4.31, section 4.4.5",
+       "Simulated as in the source: a step of 38.1 mm at 48.3 km/h, no roughness; sensor noise 0.05 m/s2.",
+       Item("Fig 4.31", Word.BETTER,
+            "Exact at the true height and linear, as published; ridelog finds mass and height together."),
+       Item("4.4.5 height from a known mass", Word.AGREES,
+            "With a known mass the fit gives the step's height, as the text proposes."),
+       Item("4.4.5 speed", Word.MISPRINT, "30 mph is 48.3 km/h, not m/s."))
+def fig_4_31(effort: Workload) -> Result:
     heights_m = tuple(np.linspace(0.0254, 0.0508, 9).round(6).tolist())
     record = without_profile(record_of(bridge(_STEP_AT_M_F4_31), BRIDGE_MPS, 6.0, Conditions()))
     heights = effort.some(heights_m, 3)
@@ -773,17 +745,13 @@ def _mass(record: Run, height_m: float, ours: bool) -> float:
                   RoadInput(step=RoadStep(_STEP_AT_M_F4_31, height_m))).parameters[MASS]
 
 
-F4_31 = Study("fig_4_31", "Mass against the assumed height of a bridge's step", "Fig 4.31, section 4.4.5",
-              "Simulated as in the source: a step of 38.1 mm at 48.3 km/h, no roughness; sensor noise 0.05 m/s2.",
-              _f4_31,
-              items=(Item("Fig 4.31", Word.BETTER,
-                          "Exact at the true height and linear, as published; ridelog finds mass and height together."),
-                     Item("4.4.5 height from a known mass", Word.AGREES,
-                          "With a known mass the fit gives the step's height, as the text proposes."),
-                     Item("4.4.5 speed", Word.MISPRINT, "30 mph is 48.3 km/h, not m/s.")))
-
-
-def _f4_32(effort: Workload) -> Result:
+@study("A bridge's step on a smooth road, and the response of the car", "Fig 4.32, section 4.4.6",
+       "Simulated as in the source: a step of 38.1 mm down at 48.3 km/h on a road of IRI 2 m/km.",
+       Item("Fig 4.32", Word.NOT_REPRODUCIBLE, "The published road is another random draw; this one has the published "
+                                               "IRI within the scatter of such draws."),
+       Item("Fig 4.33", Word.NOT_REPRODUCIBLE,
+            "The response to that road cannot be repeated; in a simulated one, the step stands out as described."))
+def fig_4_32(effort: Workload) -> Result:
     printed_iri = 2.0
     step_at_m, length_m, seed = 50.0, 100.0, 0
     behind_m = 15.0  # both axles are over the step and the body has swung out
@@ -817,23 +785,19 @@ def _f4_32(effort: Workload) -> Result:
     return Result((), verdict, pictures, values)
 
 
-F4_32 = Study("fig_4_32", "A bridge's step on a smooth road, and the response of the car", "Fig 4.32, section 4.4.6",
-              "Simulated as in the source: a step of 38.1 mm down at 48.3 km/h on a road of IRI 2 m/km.", _f4_32,
-              items=(Item("Fig 4.32", Word.NOT_REPRODUCIBLE,
-                          "The published road is another random draw; this one has the published IRI within the "
-                          "scatter of such draws."),
-                     Item("Fig 4.33", Word.NOT_REPRODUCIBLE,
-                          "The response to that road cannot be repeated; in a simulated one, the step stands out as "
-                          "described.")))
-
-
 PRINTED_PEAK_MPS2 = 1.5
 SECTIONS_M = (1.0, 10.0)
 OF_ONE_SIZE = 0.4  # a metre is a thirteenth of a second: where it begins moves its a_w by 0.2; as much for "close to"
 _LENGTH_M_F4_34 = 100.0
 
 
-def _f4_34(effort: Workload) -> Result:
+@study("Discomfort of a bridge's step, per metre and per 10 m", "Fig 4.34 (and 4.35), section 4.4.6",
+       "Simulated as in the source: a step of 38.1 mm down at 48.3 km/h on a road of IRI 2 m/km; weighting Wk.",
+       Item("Fig 4.34", Word.NOT_REPRODUCIBLE, "The road and the filter of the figure are not published; in the "
+                                               "simulation the discomfort per metre has the published size."),
+       Item("Fig 4.35", Word.NOT_REPRODUCIBLE, "The road and the filter of the figure are not published; in the "
+                                               "simulation the step is still clear over 10 m."))
+def fig_4_34(effort: Workload) -> Result:
     # From the lower end of uncomfortable to the upper end of very uncomfortable, Table 2.5 [m/s2].
     uncomfortable = (0.8, 2.5)
     roads = effort.count(20)
@@ -880,18 +844,12 @@ def per_section(record: Run, section_m: float, length_m: float) -> Array:
     return np.array([a_w(weighted[start:end]) for start, end in pairwise(edges.tolist())])
 
 
-F4_34 = Study("fig_4_34", "Discomfort of a bridge's step, per metre and per 10 m", "Fig 4.34 (and 4.35), section 4.4.6",
-              "Simulated as in the source: a step of 38.1 mm down at 48.3 km/h on a road of IRI 2 m/km; weighting Wk.",
-              _f4_34,
-              items=(Item("Fig 4.34", Word.NOT_REPRODUCIBLE,
-                          "The road and the filter of the figure are not published; in the simulation the discomfort "
-                          "per metre has the published size."),
-                     Item("Fig 4.35", Word.NOT_REPRODUCIBLE,
-                          "The road and the filter of the figure are not published; in the simulation the step is "
-                          "still clear over 10 m.")))
-
-
-def _f4_36(effort: Workload) -> Result:
+@study("Discomfort of a bridge's step by height and speed", "Fig 4.36, section 4.4.6",
+       "Simulated as in the source: a step down on a road without roughness; a_w by Wk, per metre.",
+       Item("Fig 4.36", Word.NOT_REPRODUCIBLE,
+            "The heights, speeds and limits of the figure are not published; the one published value, from Fig 4.34, "
+            "is about as large as that of ridelog."))
+def fig_4_36(effort: Workload) -> Result:
     heights_m = (0.0127, 0.0254, 0.0381, 0.0508, 0.0635)
     speeds_kmh = (16.1, 32.2, 48.3, 64.4, 80.5, 96.6)
     comfort_limits = (COMFORT_WORDS[-2], COMFORT_WORDS[-4])
@@ -932,12 +890,5 @@ def _peak_f4_36(height_m: float, speed_mps: float) -> float:
     record = record_of(bridge(20.0, -height_m), speed_mps, seconds, Conditions(noise_mps2=0.0))
     return float(per_section(record, 1.0, length_m).max())
 
-
-F4_36 = Study("fig_4_36", "Discomfort of a bridge's step by height and speed", "Fig 4.36, section 4.4.6",
-              "Simulated as in the source: a step down on a road without roughness; a_w by Wk, per metre.", _f4_36,
-              items=(Item("Fig 4.36", Word.NOT_REPRODUCIBLE,
-                          "The heights, speeds and limits of the figure are not published; the one published value, "
-                          "from Fig 4.34, is about as large as that of ridelog."),))
-
-STUDIES = (T4_1, T4_2, T4_3, F4_3, F4_16, F4_18, T4_4, F4_19, F4_21, F4_22, F4_25, F4_27, F4_30, F4_31, F4_32, F4_34,
-           F4_36)
+STUDIES = (table_4_1, table_4_2, table_4_3, fig_4_3, fig_4_16, fig_4_18, table_4_4, fig_4_19, fig_4_21, fig_4_22,
+           fig_4_25, fig_4_27, fig_4_30, fig_4_31, fig_4_32, fig_4_34, fig_4_36)

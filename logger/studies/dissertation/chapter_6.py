@@ -57,13 +57,13 @@ from logger.studies.study import (
     Picture,
     Result,
     Statement,
-    Study,
     Table,
     Value,
     Word,
     Workload,
     about,
     alike,
+    study,
 )
 from logger.units import FOOT_M, KMH_MPS, MPH_MPS, WINDOW_M
 from logger.vehicle.linearise import known_vehicle
@@ -79,7 +79,14 @@ CASES_T6_1 = (("all as assumed",
 _OFF = 0.05
 
 
-def _t6_1(effort: Workload) -> Result:
+@study("Mass from speed bumps whose size and speed differ a little from the assumed ones",
+       "Table 6.1 (and 6.2), section 6.2.1",
+       "The source's records were never published. Simulated: the car of Table 4.2, a PS-2119 with steps of 0.01 g, 20 "
+       "Hz low-pass and a start at 875 kg for the source's method, as in 6.2.1.",
+       *alike(("Table 6.1", "Table 6.2"), Word.NOT_REPRODUCIBLE,
+              "The records were never published; errors of that kind follow from a bump and a speed that are a few per "
+              "cent off."))
+def table_6_1(effort: Workload) -> Result:
     # Share by which a speedometer may be off at 16.1 km/h: a tenth and 4 km/h (UNECE Regulation 39, 5.4).
     speedometer = (0.1 * 16.1 + 4) / 16.1
     road_iri = 3.0
@@ -164,20 +171,17 @@ def _rms_t6_1(values: np.ndarray) -> float:
     return float(np.sqrt((values**2).mean()))
 
 
-T6_1 = Study("table_6_1", "Mass from speed bumps whose size and speed differ a little from the assumed ones",
-             "Table 6.1 (and 6.2), section 6.2.1",
-             "The source's records were never published. Simulated: the car of Table 4.2, a PS-2119 "
-             "with steps of 0.01 g, 20 Hz low-pass and a start at 875 kg for the source's method, as in 6.2.1.", _t6_1,
-             items=alike(("Table 6.1", "Table 6.2"), Word.NOT_REPRODUCIBLE, "The records were never published; errors "
-                         "of that kind follow from a bump and a speed that are a few per cent off."))
-
-
 PRINTED_T6_3 = (("1-1", 700.528, 19.94, 1398.92, 59.88), ("1-2", 596.911, 31.78, 983.834, 12.44),
            ("2-1", 576.042, 34.17, 460.687, 47.35), ("2-2", 416.843, 52.36, 496.564, 43.25))
 REFUSED = "cannot tell"
 
 
-def _t6_3(effort: Workload) -> Result:
+@study("Mass from a bridge's steps", "Table 6.3 (and 6.4), section 6.2.2",
+       "The source's records were never published. Simulated: the car of Table 4.2, a PS-2119 with steps of 0.01 g, "
+       "steps of 38.1 and 12.7 mm on roads of IRI 0, 2 and 5 m/km; the position of a step is also estimated.",
+       *alike(("Table 6.3", "Table 6.4"), Word.NOT_REPRODUCIBLE,
+              "The records were never published; a flat input shows nothing of the mass, and ridelog refuses it."))
+def table_6_3(effort: Workload) -> Result:
     # True step [m] and the road's IRI [m/km].
     all_cases = tuple((step_m, iri) for step_m in (STEP_M, 0.0127) for iri in (0.0, 2.0, 5.0))
     chance = 0.58  # twice the standard error of an r.m.s. of six, as a share of it
@@ -275,19 +279,17 @@ def _rms_t6_3(values: Sequence[tuple[float, ...]]) -> list[float]:
     return [float(value) for value in np.sqrt((np.array(values) ** 2).mean(axis=0))]
 
 
-T6_3 = Study("table_6_3", "Mass from a bridge's steps", "Table 6.3 (and 6.4), section 6.2.2", "The source's records "
-             "were never published. Simulated: the car of Table 4.2, a PS-2119 with steps of 0.01 g, "
-             "steps of 38.1 and 12.7 mm on roads of IRI 0, 2 and 5 m/km; the position of a step is also "
-             "estimated.", _t6_3,
-             items=alike(("Table 6.3", "Table 6.4"), Word.NOT_REPRODUCIBLE, "The records were never published; a flat "
-                         "input shows nothing of the mass, and ridelog refuses it."))
-
-
 _UNIT_M = 0.01
 _LIMIT = {word: limit for limit, word in COMFORT_WORDS}
 
 
-def _t6_5(effort: Workload) -> Result:
+@study("Three revisited places, and the obstacles that would explain them", "Table 6.5, section 6.5.3",
+       "The source used measured records. Simulated: the car of Table 4.2 at the speeds of Table D.1 over a step and a "
+       "dip on a flat road, 15 Hz low-pass, weighted with Wk; the worst window of 25 ft, averaged over the position of "
+       "the obstacle in its window; random roads for the damage.",
+       Item("Table 6.5", Word.NOT_REPRODUCIBLE, "Neither the records nor the sizes were published; a step, a manhole "
+                                                "and damage of realistic sizes would explain the published words."))
+def table_6_5(effort: Workload) -> Result:
     printed_rows = ((1, 5, "a_little_uncomfortable", "intersection of new and old pavement"),
                     (2, 6, "fairly_uncomfortable", "manhole"), (3, 23, "uncomfortable", "damaged pavement"))
     # Sizes that the source names: steps from where a bridge needs maintenance to where many have one (4.4.5) [mm],
@@ -352,21 +354,19 @@ def _row_t6_5(printed: tuple[int, int, str, str], what: str, factor: float) -> t
             low, high, ours.replace("_", " "))
 
 
-T6_5 = Study("table_6_5", "Three revisited places, and the obstacles that would explain them",
-             "Table 6.5, section 6.5.3",
-              "The source used measured records. Simulated: the car of Table 4.2 at the speeds of Table D.1 over a "
-              "step and a dip "
-              "on a flat road, 15 Hz low-pass, weighted with Wk; the worst window of 25 ft, averaged over the "
-              "position of the obstacle in its window; random roads for the damage.", _t6_5,
-              items=(Item("Table 6.5", Word.NOT_REPRODUCIBLE,
-                          "Neither the records nor the sizes were published; a step, a manhole and damage of "
-                          "realistic sizes would explain the published words."),))
-
-
 PRINTED_GD_CM3 = (2.0, 4096.0)
 
 
-def _f6_6(effort: Workload) -> Result:
+@study("IRI per r.m.s. acceleration at each speed, and the effect of load", "Fig 6.6 (6.3 to 6.8), section 6.3",
+       "Computed from the half car of Table 4.2 and the spectrum of ISO 8608, and from simulated drives over random "
+       "roads of 1 km; the source's roads have 100 m and 2 to 4096 cm3, which makes no difference for a linear car.",
+       Item("Fig 6.3", Word.NOT_REPRODUCIBLE,
+            "A diagram without values: from the response through the vehicle to the IRI."),
+       *alike(("Fig 6.4", "Fig 6.5"), Word.AGREES,
+              "The r.m.s. grows with the square root of the degree of roughness, and with the speed, as drawn."),
+       Item("Fig 6.6", Word.AGREES, "One line through the origin for each speed, flatter at higher speeds."),
+       *alike(("Fig 6.7", "Fig 6.8"), Word.AGREES, "More mass makes each line steeper."))
+def fig_6_6(effort: Workload) -> Result:
     speeds = np.array(SPEEDS_MPH) * MPH_MPS
     cars = (rav4(), rms_calibration.loaded(rav4(), passengers=2),
             rms_calibration.loaded(rav4(), sprung_mass_factor=2.0))
@@ -444,27 +444,20 @@ def _fan(slopes: Array) -> tuple[Line, ...]:
                  for mph, slope in zip(SPEEDS_MPH, slopes.tolist(), strict=True))
 
 
-F6_6 = Study("fig_6_6", "IRI per r.m.s. acceleration at each speed, and the effect of load",
-              "Fig 6.6 (6.3 to 6.8), section 6.3",
-              "Computed from the half car of Table 4.2 and the spectrum of ISO 8608, and from simulated drives over "
-              "random roads of 1 km; the source's roads have 100 m and 2 to 4096 cm3, which makes no difference for a "
-              "linear car.", _f6_6,
-              items=(Item("Fig 6.3", Word.NOT_REPRODUCIBLE,
-                          "A diagram without values: from the response through the vehicle to the IRI."),
-                     *alike(("Fig 6.4", "Fig 6.5"), Word.AGREES,
-                            "The r.m.s. grows with the square root of the degree of roughness, and with the speed, as "
-                            "drawn."),
-                     Item("Fig 6.6", Word.AGREES,
-                          "One line through the origin for each speed, flatter at higher speeds."),
-                     *alike(("Fig 6.7", "Fig 6.8"), Word.AGREES, "More mass makes each line steeper.")))
-
-
 PRINTED = {10: "too high", 40: "accurate", 70: "too low"}
 WAVINESS = (1.6, 2.0, 2.4)
 _IRI, _LENGTH_M_F6_9 = 2.5, 305.0
 
 
-def _f6_9(effort: Workload) -> Result:
+@study("IRI from acceleration beside the exact one, by speed and in windows", "Fig 6.9 (to 6.15), section 6.3.1",
+       "The source simulates its half car over a ProVAL profile that it does not name. Random roads of 305 m, IRI 2.5 "
+       "m/km and three wavinesses replace it here; the car of Table 4.2 with a PS-2119.",
+       *alike(("Fig 6.9", "Fig 6.10"), Word.NOT_REPRODUCIBLE, "The profile is not named; a random road replaces it."),
+       Item("Fig 6.11", Word.BETTER, "The drift with speed appears as published and comes from the road's waviness; "
+                                     "ridelog's estimate does not drift."),
+       *alike([f"Fig 6.{number}" for number in range(12, 16)], Word.BETTER,
+              "At 40 mph the relation is right on average; the errors of ridelog's windows are half as large."))
+def fig_6_9(effort: Workload) -> Result:
     windows_m = (100 * FOOT_M, 25 * FOOT_M)
     windowed_mph = 40
     speeds, roads = effort.some(SPEEDS_MPH), effort.count(6, 1)
@@ -557,22 +550,12 @@ def _compared(title: str, cut: Figures) -> Curves:
         Line("r.m.s. relation", cut.middle_m, cut.by_rms_m_per_km)))
 
 
-F6_9 = Study("fig_6_9", "IRI from acceleration beside the exact one, by speed and in windows",
-              "Fig 6.9 (to 6.15), section 6.3.1",
-              "The source simulates its half car over a ProVAL profile that it does not name. Random roads of 305 m, "
-              "IRI 2.5 m/km and three wavinesses replace it here; the car of Table 4.2 with a PS-2119.",
-              _f6_9,
-              items=(*alike(("Fig 6.9", "Fig 6.10"), Word.NOT_REPRODUCIBLE,
-                            "The profile is not named; a random road replaces it."),
-                     Item("Fig 6.11", Word.BETTER,
-                          "The drift with speed appears as published and comes from the road's waviness; ridelog's "
-                          "estimate does not drift."),
-                     *alike([f"Fig 6.{number}" for number in range(12, 16)], Word.BETTER,
-                            "At 40 mph the relation is right on average; the errors of ridelog's windows are half as "
-                            "large.")))
-
-
-def _f6_16(effort: Workload) -> Result:
+@study("Comfort by roughness and speed", "Fig 6.16 (and 6.17), section 6.4",
+       "As in the source: the half car of Table 4.2 over random roads of IRI 1 to 10 m/km at 10 to 70 mph, weighted "
+       "with Wk; here 60 roads of 1 km. In addition one road of IRI 5 m/km is simulated in the time domain.",
+       *alike(("Fig 6.16", "Fig 6.17"), Word.AGREES, "Discomfort grows in proportion to roughness, and with speed; the "
+                                                     "text gives no numbers for the figures."))
+def fig_6_16(effort: Workload) -> Result:
     settings = rms_calibration.CalibrationSettings(roads=effort.count(60, 10))
     (lines,) = (rms_calibration.calibrate(known_vehicle(rav4()), None, settings) for _ in effort.each(range(1)))
     mph = np.round(np.array(rms_calibration.SPEEDS_MPS) / MPH_MPS)
@@ -618,14 +601,6 @@ def _f6_16(effort: Workload) -> Result:
                       key=lambda one: abs(one - 1)), 0.85, 1.15)]))
 
 
-F6_16 = Study("fig_6_16", "Comfort by roughness and speed", "Fig 6.16 (and 6.17), section 6.4",
-              "As in the source: the half car of Table 4.2 over random roads of IRI 1 to 10 m/km at 10 to 70 mph, "
-              "weighted with Wk; here 60 roads of 1 km. In addition one road of IRI 5 m/km is simulated in the time "
-              "domain.",
-              _f6_16, items=alike(("Fig 6.16", "Fig 6.17"), Word.AGREES, "Discomfort grows in proportion to "
-                                  "roughness, and with speed; the text gives no numbers for the figures."))
-
-
 PRINTED_MPH = {**dict.fromkeys(range(1, 38), 20), **dict.fromkeys(range(1, 5), 30), **dict.fromkeys((5, 8, 9), 25),
                22: 15}
 """Table D.1: the speed on each segment."""
@@ -639,7 +614,22 @@ _WINDOWS = 24
 _LENGTH_M_F6_23 = _WINDOWS * WINDOW_M + 1.0
 
 
-def _f6_23(effort: Workload) -> Result:
+@study("37 road segments at their speeds: a map of roughness and one of comfort",
+       "Fig 6.23 (6.19 to 6.24, and Table D.1), section 6.5",
+       "The source's records were never published, nor are the segments' lengths given. Simulated: 37 random roads of "
+       "183 m, median IRI 2.5 m/km, waviness 1.7, each at its speed of Table D.1; the car of Table 4.2 with a PS-2119, "
+       "15 Hz low-pass, windows of 25 ft.",
+       Item("Fig 6.19", Word.NOT_REPRODUCIBLE, "A map of the places, which were published in no other form."),
+       Item("Fig 6.20", Word.AGREES, "ridelog's words change at the limits of Tables 2.3 and 2.5, on which the scales "
+                                     "are based; the colours are not given."),
+       *alike(("Fig 6.21", "Fig 6.22"), Word.NOT_REPRODUCIBLE,
+              "The record was never published; a simulated one is cut into the same windows."),
+       Item("Fig 6.23", Word.NOT_REPRODUCIBLE, "Places and records were never published; on simulated roads of "
+                                               "waviness 1.7 the r.m.s. relation reads too high at the slow speeds."),
+       Item("Fig 6.24", Word.NOT_REPRODUCIBLE,
+            "Places and records were never published; on simulated roads a majority of windows is comfortable."),
+       Item("Table D.1", Word.AGREES, "Its two columns give the same speeds."))
+def fig_6_23(effort: Workload) -> Result:
     # Where each word of Table 2.5 begins [m/s2], the second colour scale; the first has the ranges of Table 2.3.
     printed_limits = (0.0, 0.315, 0.5, 0.8, 1.25, 2.0)
     shown = 5
@@ -766,25 +756,4 @@ def _map(title: str, values: dict[int, Array], name: str, top: float) -> Field:
     return Field(title, "distance along the segment [m]", "segment of Table D.1",
                  WINDOW_M * np.arange(0.5, grid.shape[1]), np.array(list(values), dtype=float), grid, name, top)
 
-
-F6_23 = Study("fig_6_23", "37 road segments at their speeds: a map of roughness and one of comfort",
-              "Fig 6.23 (6.19 to 6.24, and Table D.1), section 6.5",
-              "The source's records were never published, nor are the segments' lengths given. "
-              "Simulated: 37 random roads of 183 m, median IRI 2.5 m/km, waviness 1.7, each at its speed of Table D.1; "
-              "the car of Table 4.2 with a PS-2119, 15 Hz low-pass, windows of 25 ft.", _f6_23,
-              items=(Item("Fig 6.19", Word.NOT_REPRODUCIBLE,
-                          "A map of the places, which were published in no other form."),
-                     Item("Fig 6.20", Word.AGREES,
-                          "ridelog's words change at the limits of Tables 2.3 and 2.5, on which the scales are based; "
-                          "the colours are not given."),
-                     *alike(("Fig 6.21", "Fig 6.22"), Word.NOT_REPRODUCIBLE,
-                            "The record was never published; a simulated one is cut into the same windows."),
-                     Item("Fig 6.23", Word.NOT_REPRODUCIBLE,
-                          "Places and records were never published; on simulated roads of waviness 1.7 the r.m.s. "
-                          "relation reads too high at the slow speeds."),
-                     Item("Fig 6.24", Word.NOT_REPRODUCIBLE,
-                          "Places and records were never published; on simulated roads a majority of windows is "
-                          "comfortable."),
-                     Item("Table D.1", Word.AGREES, "Its two columns give the same speeds.")))
-
-STUDIES = (T6_1, T6_3, T6_5, F6_6, F6_9, F6_16, F6_23)
+STUDIES = (table_6_1, table_6_3, table_6_5, fig_6_6, fig_6_9, fig_6_16, fig_6_23)

@@ -60,13 +60,13 @@ from logger.studies.study import (
     Picture,
     Result,
     Statement,
-    Study,
     Table,
     Value,
     Word,
     Workload,
     about,
     alike,
+    study,
 )
 from logger.units import MPH_MPS, STANDARD_GRAVITY_MPS2, WINDOW_M
 from logger.vehicle.linear_car import AxleResponse
@@ -82,7 +82,14 @@ HOW = ("Simulated: the five-storey building of 5.3 with 1.34 % of damping, pulle
        "the published one; gains and noise of the sensors are assumed.")
 
 
-def _t5_1(effort: Workload) -> Result:
+@study("R.m.s. of two sensors on the five-storey building", "Table 5.1, section 5.3", HOW,
+       Item("Table 5.1", Word.MISPRINT,
+            "The unit must be g, as the peaks of Eq 5.3 demand, not m/s2; the records were never published."),
+       Item("Eq 5.1", Word.NOT_REPRODUCIBLE,
+            "The records were never published; two simulated sensors also differ by a few per cent."),
+       Item("Fig 5.8", Word.NOT_REPRODUCIBLE,
+            "The records were never published; those of two simulated sensors match as described."))
+def table_5_1(effort: Workload) -> Result:
     printed_difference_percent = 2.85  # Eq 5.1
     rounding_percent = 0.2  # of a difference of two values of three figures
     of_one_size_g = 0.015  # the length of the record is chosen so that the two are near each other
@@ -123,20 +130,16 @@ def _reading(number: int, samples: int) -> Array:
     return np.asarray(reading / STANDARD_GRAVITY_MPS2)
 
 
-T5_1 = Study("table_5_1", "R.m.s. of two sensors on the five-storey building", "Table 5.1, section 5.3", HOW, _t5_1,
-              items=(Item("Table 5.1", Word.MISPRINT,
-                          "The unit must be g, as the peaks of Eq 5.3 demand, not m/s2; the records were never "
-                          "published."),
-                     Item("Eq 5.1", Word.NOT_REPRODUCIBLE,
-                          "The records were never published; two simulated sensors also differ by a few per cent."),
-                     Item("Fig 5.8", Word.NOT_REPRODUCIBLE,
-                          "The records were never published; those of two simulated sensors match as described.")))
-
-
 PRINTED_HZ = (0.074, 2.548, 4.226)  # both sensors
 
 
-def _t5_2(effort: Workload) -> Result:
+@study("Modal frequencies from two sensors, and damping", "Table 5.2, section 5.3, with Eq 5.3", HOW,
+       Item("Table 5.2", Word.MISPRINT, "The published 0.074 Hz is 0.7419 Hz, as in Table 5.4."),
+       Item("Fig 5.9", Word.NOT_REPRODUCIBLE,
+            "The records were never published; those of two simulated sensors have peaks near the published three."),
+       Item("Eq 5.3", Word.MISPRINT,
+            "The ratio agrees for peaks of 0.1978 and 0.08545 g; the table above it has 0.8545 m/s2."))
+def table_5_2(effort: Workload) -> Result:
     printed_first_hz = 0.7419  # the same mode in Table 5.4
     printed_peaks_g, printed_cycles = (0.198, 0.085), 10
     printed_damping_percent = 1.34
@@ -189,20 +192,18 @@ def _line(number: int) -> Line:
     return Line(SENSORS[number].name, np.asarray(step_hz * np.arange(len(power)), float)[shown], power[shown])
 
 
-T5_2 = Study("table_5_2",
-              "Modal frequencies from two sensors, and damping", "Table 5.2, section 5.3, with Eq 5.3", HOW, _t5_2,
-              items=(Item("Table 5.2", Word.MISPRINT, "The published 0.074 Hz is 0.7419 Hz, as in Table 5.4."),
-                     Item("Fig 5.9", Word.NOT_REPRODUCIBLE,
-                          "The records were never published; those of two simulated sensors have peaks near the "
-                          "published three."),
-                     Item("Eq 5.3", Word.MISPRINT,
-                          "The ratio agrees for peaks of 0.1978 and 0.08545 g; the table above it has 0.8545 m/s2.")))
-
-
 PRINTED_ERROR_PERCENT = (0.46, 1.88, 7.29)
 
 
-def _t5_4(effort: Workload) -> Result:
+@study("Natural frequencies of the five-storey building", "Table 5.4, section 5.3",
+       "The eigenvalue problem of Eq 5.4, and a simulated record: pulled aside and released, 1.34 % damping, 75 s at "
+       "100 Hz, steps of 0.01 g; the source's record was never published.",
+       Item("Table 5.3", Word.AGREES, "The model's floors have the masses of the components."),
+       Item("Table 5.4", Word.MISPRINT, "The model's second mode is 2.600 Hz for these masses, not 2.500."),
+       Item("Fig 5.10", Word.AGREES, "The chain has one mass for each floor, and five modes."),
+       Item("5.3 stiffness of a storey", Word.MISPRINT,
+            "The labels are swapped: 12 EI / h^3 has both ends fixed, 3 EI / h^3 one."))
+def table_5_4(effort: Workload) -> Result:
     # Ends of a column, its printed stiffness in EI / h^3, and whether one end may turn.
     printed_stiffness = (("fixed-fixed", 3.0, False), ("fixed-free", 12.0, True))
     building = five_storey.structure()
@@ -282,17 +283,6 @@ def _near(found: ModalResult, frequency_hz: float | None) -> tuple[Cell, ...]:
     return "not there", None, None
 
 
-T5_4 = Study("table_5_4", "Natural frequencies of the five-storey building", "Table 5.4, section 5.3",
-              "The eigenvalue problem of Eq 5.4, and a simulated record: pulled aside and released, 1.34 % damping, "
-              "75 s at 100 Hz, steps of 0.01 g; the source's record was never published.", _t5_4,
-              items=(Item("Table 5.3", Word.AGREES, "The model's floors have the masses of the components."),
-                     Item("Table 5.4", Word.MISPRINT,
-                          "The model's second mode is 2.600 Hz for these masses, not 2.500."),
-                     Item("Fig 5.10", Word.AGREES, "The chain has one mass for each floor, and five modes."),
-                     Item("5.3 stiffness of a storey", Word.MISPRINT,
-                          "The labels are swapped: 12 EI / h^3 has both ends fixed, 3 EI / h^3 one.")))
-
-
 PRINTED = (("newly paved road", 40.2, 0.2017, 2.51, 13.57), ("rough road", 40.2, 0.8899, 1.01, 12.82),
            ("damaged pavement", 32.2, 0.8437, 2.01, 12.06), ("speed bumps", 16.1, 0.8703, 1.51, 12.56))
 PRINTED_MODEL_HZ = (1.1, 11.0)
@@ -300,7 +290,17 @@ RESPONSES = tuple(f"Fig 5.{number}" for number in (13, 15, 17, 19))
 """Of the same surfaces; the figures between them are photographs."""
 
 
-def _t5_5(effort: Workload) -> Result:
+@study("Resonances of the car on four surfaces", "Table 5.5, section 5.5.1",
+       "The source used measured records. Simulated: the car of Table 4.2 with a PS-2119, a minute on random roads "
+       "whose roughness was chosen, with four bumps of 5.5.2 on the last one. f1 and f2 are the highest bins of the "
+       "summed spectra of equal 2 s segments, within 0.5 to 5 and 7 to 18 Hz.",
+       Item("Table 5.5", Word.NOT_REPRODUCIBLE,
+            "The records were never published; a simulated car shows peaks of the same kind."),
+       *alike(RESPONSES, Word.NOT_REPRODUCIBLE,
+              "The record was never published; that of a simulated car also has its first peak at 1 to 2.5 Hz."),
+       *alike(("Fig 5.12", "Fig 5.14", "Fig 5.16", "Fig 5.18"), Word.NOT_REPRODUCIBLE, "A photograph of the surface."),
+       Item("5.5.1 model", Word.AGREES, "The half car's natural frequencies are the published ones."))
+def table_5_5(effort: Workload) -> Result:
     assumed_iri = (1.5, 8.0, 8.0, 2.0)
     # The humps are that broad, and the car that was measured is not the one of Table 4.2.
     f1_tolerance_hz, f2_tolerance_hz = 1.6, 3.5
@@ -373,21 +373,6 @@ def _bumps(place_m: np.ndarray) -> np.ndarray:
     return np.sum([bump(start_m)(place_m) for start_m in bumps_at_m], axis=0)
 
 
-T5_5 = Study("table_5_5", "Resonances of the car on four surfaces", "Table 5.5, section 5.5.1",
-              "The source used measured records. Simulated: the car of Table 4.2 with a PS-2119, a minute on random "
-              "roads whose "
-              "roughness was chosen, with four bumps of 5.5.2 on the last one. f1 and f2 are the highest bins of the "
-              "summed spectra of equal 2 s segments, within 0.5 to 5 and 7 to 18 Hz.", _t5_5,
-              items=(Item("Table 5.5", Word.NOT_REPRODUCIBLE,
-                          "The records were never published; a simulated car shows peaks of the same kind."),
-                     *alike(RESPONSES, Word.NOT_REPRODUCIBLE,
-                            "The record was never published; that of a simulated car also has its first peak at 1 to "
-                            "2.5 Hz."),
-                     *alike(("Fig 5.12", "Fig 5.14", "Fig 5.16", "Fig 5.18"), Word.NOT_REPRODUCIBLE,
-                            "A photograph of the surface."),
-                     Item("5.5.1 model", Word.AGREES, "The half car's natural frequencies are the published ones.")))
-
-
 TUBE_M = 0.00635
 WANTED_PERCENT = 5.0
 _AT_M = 20.0
@@ -413,7 +398,18 @@ def tube(start_m: float, diameter_m: float = TUBE_M) -> Shape:
     return bump(start_m, diameter_m, diameter_m)
 
 
-def _f5_22(effort: Workload) -> Result:
+@study("Bump, bridge and road tube: the response of the car, and why a tube is too weak",
+       "Fig 5.22 (and 5.25, 5.26, 5.28, 5.29), sections 5.5.2 to 5.5.4",
+       "The source's records were never published. Simulated: the car of Table 4.2 with a PS-2119 over each obstacle "
+       "at its speed, alone and on a road of IRI 2 m/km (the source does not give the roughness of its roads); the "
+       "mass is fitted with the obstacle known.",
+       Item("Fig 5.22", Word.NOT_REPRODUCIBLE, "The record was never published; in the simulation the bump stands out "
+                                               "clearly from the road, at half of the measured size."),
+       *alike(("Fig 5.25", "Fig 5.26"), Word.NOT_REPRODUCIBLE,
+              "The record was never published; in the simulation there are two spikes, a wheelbase apart."),
+       *alike(("Fig 5.28", "Fig 5.29"), Word.NOT_REPRODUCIBLE,
+              "The record was never published; in the simulation the road hides the tube, as the text says."))
+def fig_5_22(effort: Workload) -> Result:
     printed_largest_g = 0.8703  # of the row of speed bumps, Table 5.5
     cases = (
         _Case("bump, 150 mm by 2.60 m", "Fig 5.22", "strong signal",
@@ -504,29 +500,19 @@ def _picture(case: _Case, alone: Run, sensed: Run) -> Picture:
               for name, one in lines)), case.drawn)
 
 
-F5_22 = Study("fig_5_22", "Bump, bridge and road tube: the response of the car, and why a tube is too weak",
-              "Fig 5.22 (and 5.25, 5.26, 5.28, 5.29), sections 5.5.2 to 5.5.4",
-              "The source's records were never published. Simulated: the car of Table 4.2 with a "
-              "PS-2119 over each obstacle at its speed, alone and on a road of IRI 2 m/km (the source does not give "
-              "the roughness of its roads); the mass is fitted with the obstacle known.", _f5_22,
-              items=(Item("Fig 5.22", Word.NOT_REPRODUCIBLE,
-                          "The record was never published; in the simulation the bump stands out clearly from the "
-                          "road, at half of the measured size."),
-                     *alike(("Fig 5.25", "Fig 5.26"), Word.NOT_REPRODUCIBLE,
-                            "The record was never published; in the simulation there are two spikes, a wheelbase "
-                            "apart."),
-                     *alike(("Fig 5.28", "Fig 5.29"), Word.NOT_REPRODUCIBLE,
-                            "The record was never published; in the simulation the road hides the tube, as the text "
-                            "says.")))
-
-
 # --- section 7.2 ---
 
 _SPEED_MPS = 14.0
 _SKIP = 200
 
 
-def _full_car(effort: Workload) -> Result:
+@study("A full car, where left and right tracks differ", "Section 7.2, second item",
+       "Nothing is published: the source names it as future work. Simulated: two sides of the half car of Table 4.2 as "
+       "one full car (rav4-2009-full) with a PS-2119 at 14 m/s over 400 m of two random tracks of IRI 4 m/km, which "
+       "share all, some or none of their waves.",
+       Item("7.2 full car", Word.BETTER,
+            "Every command takes a full car, which explains the effect of two different tracks."))
+def section_7_2_full_car(effort: Workload) -> Result:
     shares = (1.0, 0.9, 0.5, 0.0)  # Share of the right track's mean square that it has from the left one.
     sides_m = (0.0, 0.4)
     cases = [(shared, left_m) for left_m in sides_m for shared in effort.some(shares)]
@@ -589,15 +575,12 @@ def _half(road: Track) -> Run:
     return drive_over(replace(road, elevation_m=road.elevation_m[:, 0]), _SPEED_MPS, Conditions(0.0))
 
 
-FULL_CAR = Study("section_7_2_full_car", "A full car, where left and right tracks differ", "Section 7.2, second item",
-              "Nothing is published: the source names it as future work. Simulated: two sides of the half car of Table "
-              "4.2 as one full car (rav4-2009-full) with a PS-2119 at 14 m/s over 400 m of two random tracks of IRI 4 "
-              "m/km, which share all, some or none of their waves.", _full_car,
-              items=(Item("7.2 full car", Word.BETTER,
-                          "Every command takes a full car, which explains the effect of two different tracks."),))
-
-
-def _input(effort: Workload) -> Result:
+@study("The input found from the response", "Section 7.2, first item",
+       "Nothing is published: the source names it as future work. Simulated: the car of Table 4.2 with a PS-2119 over "
+       "300 m of random road of IRI 4 m/km at 10 and 20 m/s.",
+       Item("7.2 input from response", Word.BETTER, "ridelog finds the profile from the response of a known car, and "
+                                                    "the mass from two drives over one road that nobody measured."))
+def section_7_2_input(effort: Workload) -> Result:
     speeds_mps = (10.0, 20.0)
     iri, length_m = 4.0, 300
     road = random_road(iri, effort.count(length_m, length_m // 2), 7)
@@ -670,14 +653,6 @@ def _of_profile(drive: Run, _start_m: float, _spacing_m: float, true: Array, our
             1000 * float((ours - true).std()), float(np.corrcoef(true, ours)[0, 1]))
 
 
-INPUT = Study("section_7_2_input", "The input found from the response", "Section 7.2, first item",
-              "Nothing is published: the source names it as future work. Simulated: the car of Table 4.2 with a "
-              "PS-2119 over 300 m of random road of IRI 4 m/km at 10 and 20 m/s.", _input,
-              items=(Item("7.2 input from response", Word.BETTER,
-                          "ridelog finds the profile from the response of a known car, and the mass from two drives "
-                          "over one road that nobody measured."),))
-
-
 INPUTS = {("bump, 150 mm", 10): "used", ("bridge, step of 38.1 mm", 30): "used", ("tube, 6.35 mm", 10): "too weak"}
 RELATION_MPH = 30
 _SECONDS, _IRI_OTHER_VEHICLES = 8.0, 2.0
@@ -693,7 +668,13 @@ class _Input:
     spacing_m: float = SPACING_M
 
 
-def _other_vehicles(effort: Workload) -> Result:
+@study("Other vehicles, other inputs, other speeds", "Section 7.2, fourth item",
+       "Nothing is published: the source names it as future work. Simulated: every vehicle that comes with ridelog "
+       "over the bump of 5.5.2, and the car of Table 4.2 over other inputs, with a PS-2119 on a road of IRI 2 m/km; "
+       "the obstacle is known, the road is not.",
+       Item("7.2 other vehicles", Word.BETTER,
+            "Seven vehicles come with ridelog; it predicts before any drive how well each input shows a mass."))
+def section_7_2_other_vehicles(effort: Workload) -> Result:
     all_inputs = (
         *(_Input(f"bump, {1000 * height:.0f} mm", bump(_AT_M, height), 10)
           for height in (BUMP_HEIGHT_M / 2, BUMP_HEIGHT_M)),
@@ -771,17 +752,12 @@ def _mass_error(car: Vehicle, shape: Shape, speed_mps: float, spacing_m: float) 
     return f"{100 * found.standard_errors[MASS] / car.sprung_mass_kg:.1f}"
 
 
-OTHER_VEHICLES = Study("section_7_2_other_vehicles", "Other vehicles, other inputs, other speeds",
-                       "Section 7.2, fourth item",
-              "Nothing is published: the source names it as future work. Simulated: every vehicle that comes with "
-              "ridelog over the bump of 5.5.2, and the car of Table 4.2 over other inputs, with a PS-2119 on a road of "
-              "IRI 2 m/km; the obstacle is known, the road is not.", _other_vehicles,
-              items=(Item("7.2 other vehicles", Word.BETTER,
-                          "Seven vehicles come with ridelog; it predicts before any drive how well each input shows a "
-                          "mass."),))
-
-
-def _sensor_position(effort: Workload) -> Result:
+@study("A sensor away from the centre of gravity", "Section 7.2, third item",
+       "Nothing is published: the source names it as future work. Computed for the half car of Table 4.2 on roads of "
+       "ISO 8608, and simulated over 230 m of random road of IRI 3 m/km with a PS-2119.",
+       Item("7.2 sensor position", Word.BETTER,
+            "The place of the sensor is part of the vehicle, so its pitch is part of the model."))
+def section_7_2_sensor_position(effort: Workload) -> Result:
     speeds_mph = (10, 20, 30, 40, 50, 60, 70)
     at_m = (-1.0, -0.5, 0.0, 0.5, 1.0)
     estimated_mph = 30
@@ -829,15 +805,11 @@ def _at(ahead_m: float) -> Vehicle:
     return replace(rav4(), sensor=SensorPlace(ahead_m=ahead_m))
 
 
-SENSOR_POSITION = Study("section_7_2_sensor_position", "A sensor away from the centre of gravity",
-                        "Section 7.2, third item",
-              "Nothing is published: the source names it as future work. Computed for the half car of Table 4.2 on "
-              "roads of ISO 8608, and simulated over 230 m of random road of IRI 3 m/km with a PS-2119.",
-              _sensor_position, items=(Item("7.2 sensor position", Word.BETTER,
-                          "The place of the sensor is part of the vehicle, so its pitch is part of the model."),))
-
-
-def _speed(effort: Workload) -> Result:
+@study("An IRI that does not drift with the speed", "Section 7.2, fifth item",
+       "Nothing is published: the source names it as future work. Simulated: the car of Table 4.2 with a PS-2119 at 10 "
+       "to 70 mph over 230 m each of random roads of IRI 3 m/km and waviness 1.6, 2 and 2.4.",
+       Item("7.2 speed", Word.BETTER, "The estimate infers the road wave by wave, so the speed of the drive cancels."))
+def section_7_2_speed(effort: Workload) -> Result:
     iri = 3.0
     limits = ErrorBound(known_vehicle(rav4()), Sensor(PS_2119.noise_mps2, PS_2119.step_mps2), WINDOW_M)
     roads = [random_road(iri, 230.0, 21 + number, waviness) for number, waviness in enumerate(WAVINESS)]
@@ -872,11 +844,5 @@ def _speed(effort: Workload) -> Result:
         Statement("r.m.s. error of a window over the smallest possible, at the worst speed",
                   "with a single accelerometer", float((own / least).max()), 0.0, 1.35, Word.BETTER)))
 
-
-SPEED = Study("section_7_2_speed", "An IRI that does not drift with the speed", "Section 7.2, fifth item",
-              "Nothing is published: the source names it as future work. Simulated: the car of Table 4.2 with a "
-              "PS-2119 at 10 to 70 mph over 230 m each of random roads of IRI 3 m/km and waviness 1.6, 2 and 2.4.",
-              _speed, items=(Item("7.2 speed", Word.BETTER,
-                          "The estimate infers the road wave by wave, so the speed of the drive cancels."),))
-
-STUDIES = (T5_1, T5_2, T5_4, T5_5, F5_22, FULL_CAR, INPUT, OTHER_VEHICLES, SENSOR_POSITION, SPEED)
+STUDIES = (table_5_1, table_5_2, table_5_4, table_5_5, fig_5_22, section_7_2_full_car, section_7_2_input,
+           section_7_2_other_vehicles, section_7_2_sensor_position, section_7_2_speed)

@@ -24,14 +24,19 @@ from logger.chart_data import Curves, Line
 from logger.modal.analysis import find_modes
 from logger.modal.five_storey import Masses, chain, random_response, with_damping_ratios
 from logger.studies import drives
-from logger.studies.study import Check, Item, Picture, Result, Statement, Study, Table, Value, Word, Workload
+from logger.studies.study import Check, Item, Picture, Result, Statement, Table, Value, Word, Workload, study
 
 PRINTED_TRUE_HZ = (0.890, 2.598, 4.095, 5.261, 6.000)
 _RATE_HZ = 20.0
 _HALF_DIGIT = 0.0005
 
 
-def _five_modes(effort: Workload) -> Result:
+@study("Five modes at 20 dB", "Example 1: getting started",
+       "The example's building: five floors of 25.91 kg, storeys of 10,000 N/m, 2 % of damping, a white force on each "
+       "floor, 10 % noise (20 dB); 300 s at 20 Hz, the rate to which the example decimates.",
+       Item("five modes at 20 dB", Word.BETTER, "ridelog finds all five automatically, each with a standard error."),
+       source="D. P. Pasca et al., pyOMA2, Examples/Example1.ipynb, January 2025")
+def five_modes(effort: Workload) -> Result:
     floor_kg, storey_n_per_m, printed_true_damping = 25.91, 10_000.0, 0.02
     # What its SSI-dat gives at order 16, the true frequencies being named by hand.
     printed_hz = (0.889, 2.601, 4.096, 5.275, 6.031)
@@ -92,16 +97,15 @@ def _beside(name: str, printed: tuple[float, ...], true: tuple[float, ...], ours
             for mode, (theirs, truth, mine, error) in enumerate(zip(printed, true, ours, std, strict=True), start=1)]
 
 
-FIVE_MODES = Study(
-    "five_modes", "Five modes at 20 dB", "Example 1: getting started",
-    "The example's building: five floors of 25.91 kg, storeys of 10,000 N/m, 2 % of damping, a white force on each "
-    "floor, 10 % noise (20 dB); 300 s at 20 Hz, the rate to which the example decimates.", _five_modes,
-    items=(Item("five modes at 20 dB", Word.BETTER,
-                "ridelog finds all five automatically, each with a standard error."),),
-    source="D. P. Pasca et al., pyOMA2, Examples/Example1.ipynb, January 2025")
-
-
-def _mass_from_a_bump(effort: Workload) -> Result:
+@study("The mass from one bump", "Errors of the mass",
+       "The half car of Table 4.2 of the dissertation over its bump of 0.15 m by 2.6 m at 16.1 km/h: 6 s at 100 Hz "
+       "with white noise of 0.05 m/s2; only the mass is fitted, from 800 kg.",
+       Item("hidden mass from a bump", Word.NOT_REPRODUCIBLE,
+            "The paper's record was not published; on simulated ones, error and standard error are those that the "
+            "noise allows."),
+       source="B. Zhao, T. Nagayama, K. Xue, Journal of Sound and Vibration 457, 2019; packages run by ridelog's "
+              "developers")
+def mass_from_a_bump(effort: Workload) -> Result:
     # Package, error of the mass [%], the standard error that it gives [%], in runs of our own on one simulated
     # record; the last ones give poles and no mass.
     peers = (("SciPy least_squares, own simulator", -0.07, 0.07), ("lmfit 1.3.4, the same simulator", -0.07, 0.07),
@@ -135,17 +139,6 @@ def _mass_from_a_bump(effort: Workload) -> Result:
     return Result((table,), verdict, (picture,), values)
 
 
-MASS_FROM_A_BUMP = Study(
-    "mass_from_a_bump", "The mass from one bump", "Errors of the mass",
-    "The half car of Table 4.2 of the dissertation over its bump of 0.15 m by 2.6 m at 16.1 km/h: 6 s at 100 Hz with "
-    "white noise of 0.05 m/s2; only the mass is fitted, from 800 kg.", _mass_from_a_bump,
-    items=(Item("hidden mass from a bump", Word.NOT_REPRODUCIBLE,
-                "The paper's record was not published; on simulated ones, error and standard error are those that the "
-                "noise allows."),),
-    source="B. Zhao, T. Nagayama, K. Xue, Journal of Sound and Vibration 457, 2019; packages run by ridelog's "
-           "developers")
-
-
 COUNTS = Path(__file__).with_name("examination.json")
 
 
@@ -165,7 +158,12 @@ def interval_percent(hits: int, cases: int) -> tuple[float, float]:
     return float(100 * max(0.0, low)), float(100 * min(1.0, high))
 
 
-def _lab_examination(effort: Workload) -> Result:
+@study("The lab's examination", "The table of goals",
+       "Counts of cases from the last published examination; the intervals are computed from them.",
+       Item("the lab's examination", Word.NOT_REPRODUCIBLE,
+            "It takes hours and was not repeated here; its counts are shown with their intervals."),
+       source="ridelog's own examination, docs/examination.md")
+def lab_examination(effort: Workload) -> Result:
     counts = examined()
     rows, met, surely = [], 0, 0
     for goal in effort.each([one for one in counts["goals"] if one["of"]]):
@@ -190,13 +188,4 @@ def _lab_examination(effort: Workload) -> Result:
                                                                                           dots=True))))
     return Result((table,), verdict, (picture,))
 
-
-LAB_EXAMINATION = Study(
-    "lab_examination", "The lab's examination", "The table of goals",
-    "Counts of cases from the last published examination; the intervals are computed from them.",
-    _lab_examination,
-    items=(Item("the lab's examination", Word.NOT_REPRODUCIBLE,
-                "It takes hours and was not repeated here; its counts are shown with their intervals."),),
-    source="ridelog's own examination, docs/examination.md")
-
-STUDIES = (FIVE_MODES, MASS_FROM_A_BUMP, LAB_EXAMINATION)
+STUDIES = (five_modes, mass_from_a_bump, lab_examination)

@@ -8,7 +8,7 @@ from logger.chart_data import Curves, Line
 from logger.dsp.weightings.wd import WEIGHTING as WD
 from logger.dsp.weightings.wk import WEIGHTING as WK
 from logger.roads.iri import STANDARD_SPEED_MPS, rectified_slope, slope_gain
-from logger.studies.study import Item, Picture, Result, Study, Value, Word, Workload, about
+from logger.studies.study import Item, Picture, Result, Value, Word, Workload, about, study
 from logger.vehicle.models import GOLDEN_CAR, quarter_car
 from logger.vehicle.structure import straight_step
 
@@ -16,7 +16,12 @@ PRINTED_IRI_CHECK_PROFILE = ((2.0, 3.77380), (4.75, 7.84294), (10.0, 5.08670), (
 """Distance [m] and the IRI from 0 to that distance [m/km], five of the 120 printed."""
 
 
-def _iri_check_profile(effort: Workload) -> Result:
+@study("The published check of an IRI program", "Pages 41 and 42",
+       "A pulse of 20 mm over 4 m at 0.25 m spacing, without a moving average, as published.",
+       Item("IRI check profile", Word.AGREES, "The running IRI agrees to the last digit."),
+       Item("IRI input coefficient", Word.MISPRINT, "The first one is published 1e-7 too small."),
+       source="Sayers, Gillespie, Paterson, World Bank Technical Paper 46, 1986")
+def iri_check_profile(effort: Workload) -> Result:
     spacing_m, length_m = 0.25, 30.0
     at_m = spacing_m * np.arange(round(length_m / spacing_m) + 1)
     pulse_m = np.interp(at_m, [0, 1, 3, 5, length_m], [0, 0, 0.02, 0, 0])
@@ -40,15 +45,11 @@ def _iri_check_profile(effort: Workload) -> Result:
     return Result((), verdict, (picture,), tuple(values))
 
 
-IRI_CHECK_PROFILE = Study(
-    "iri_check_profile", "The published check of an IRI program", "Pages 41 and 42",
-    "A pulse of 20 mm over 4 m at 0.25 m spacing, without a moving average, as published.", _iri_check_profile,
-    items=(Item("IRI check profile", Word.AGREES, "The running IRI agrees to the last digit."),
-           Item("IRI input coefficient", Word.MISPRINT, "The first one is published 1e-7 too small.")),
-    source="Sayers, Gillespie, Paterson, World Bank Technical Paper 46, 1986")
-
-
-def _golden_car_gain(effort: Workload) -> Result:
+@study("Waves to which the IRI responds", "Response of the IRI filter",
+       "Computed for the Golden Car as a continuous system, without the moving average.",
+       Item("Golden Car gain curve", Word.AGREES, "Peaks and half gains lie within 5 % of the published ones."),
+       source="Sayers and Karamihas, The Little Book of Profiling, University of Michigan, 1998")
+def golden_car_gain(effort: Workload) -> Result:
     # Peaks, and where the response is down to 0.5; wavelengths of about 15, 2.4, 30 and 1.25 m.
     printed_peaks_cpm, printed_halves_cpm = (0.065, 0.42), (0.033, 0.8)
     share = 0.05  # Of the printed value, as broad humps are read off a figure.
@@ -75,13 +76,6 @@ def _golden_car_gain(effort: Workload) -> Result:
     return Result((), verdict, (picture,), values)
 
 
-GOLDEN_CAR_GAIN = Study(
-    "golden_car_gain", "Waves to which the IRI responds", "Response of the IRI filter",
-    "Computed for the Golden Car as a continuous system, without the moving average.", _golden_car_gain,
-    items=(Item("Golden Car gain curve", Word.AGREES, "Peaks and half gains lie within 5 % of the published ones."),),
-    source="Sayers and Karamihas, The Little Book of Profiling, University of Michigan, 1998")
-
-
 HZ = ("0.5", "0.63", "0.8", "1", "1.25", "1.6", "2", "2.5", "3.15", "4", "5", "6.3", "8", "10", "12.5", "16", "20",
       "25", "31.5", "40", "50", "63", "80")
 PRINTED_ISO_2631_FACTORS = {"wk": ("418", "459", "477", "482", "484", "494", "531", "631", "804", "967", "1039", "1054",
@@ -93,7 +87,13 @@ MISPRINTED = ("wd", "10")
 _ITEMS = {"wk": "ISO 2631-1 Table 3, Wk", "wd": "ISO 2631-1 Table 3, Wd"}
 
 
-def _iso_2631_factors(effort: Workload) -> Result:
+@study("Factors of Wk and Wd at one-third-octave frequencies", "Table 3",
+       "The magnitude of the weightings' formulas at the nominal frequencies from 0.5 to 80 Hz.",
+       Item(_ITEMS["wk"], Word.AGREES, "Every factor agrees to the published digit."),
+       Item(_ITEMS["wd"], Word.MISPRINT,
+            "All factors agree except that at 10 Hz, which is published as 212 instead of 202."),
+       source="ISO 2631-1:1997, Mechanical vibration and shock: evaluation of human exposure to whole-body vibration")
+def iso_2631_factors(effort: Workload) -> Result:
     # of the last printed digit: two of the standard's factors are a little more than half of one low
     rounding = 0.75
     values: list[Value] = []
@@ -118,15 +118,6 @@ def _iso_2631_factors(effort: Workload) -> Result:
     return Result((), verdict, (picture,), tuple(values))
 
 
-ISO_2631_FACTORS = Study(
-    "iso_2631_factors", "Factors of Wk and Wd at one-third-octave frequencies", "Table 3",
-    "The magnitude of the weightings' formulas at the nominal frequencies from 0.5 to 80 Hz.", _iso_2631_factors,
-    items=(Item(_ITEMS["wk"], Word.AGREES, "Every factor agrees to the published digit."),
-           Item(_ITEMS["wd"], Word.MISPRINT, "All factors agree except that at 10 Hz, which is published as 212 "
-                                             "instead of 202.")),
-    source="ISO 2631-1:1997, Mechanical vibration and shock: evaluation of human exposure to whole-body vibration")
-
-
 PRINTED_MPS2 = {"wk": (0.0299, 0.0411, 0.0577, 0.0814, 0.115, 0.362),
                 "wd": (0.00669, 0.00906, 0.0116, 0.0148, 0.0197, 0.0590)}
 _SHARE_ISO_8041_BURSTS = {"wk": 0.0025, "wd": 0.015}
@@ -142,7 +133,12 @@ def saw_teeth(teeth: float) -> np.ndarray:
     return np.where(phase < teeth, 2 * ((phase + 0.5) % 1.0) - 1.0, 0.0)
 
 
-def _iso_8041_bursts(effort: Workload) -> Result:
+@study("Weighted r.m.s. of saw-tooth bursts", "Response to signal bursts",
+       "Saw teeth of 1 m/s2 with a period of 2 pi/100 s, for 60 s, at 20,000 samples a second.",
+       Item("ISO 8041 bursts", Word.AGREES,
+            "Wk agrees within 0.25 % and Wd within 1.5 % of the published three figures."),
+       source="ISO 8041:2005, Human response to vibration: measuring instrumentation")
+def iso_8041_bursts(effort: Workload) -> Result:
     teeth_counts = (1, 2, 4, 8, 16, inf)
     values = []
     found: dict[str, list[float]] = {"wk": [], "wd": []}
@@ -166,12 +162,4 @@ def _iso_8041_bursts(effort: Workload) -> Result:
                       "a table of responses to bursts of 1 to 16 teeth, and to a continuous train")
     return Result((), verdict, (picture,), tuple(values))
 
-
-ISO_8041_BURSTS = Study(
-    "iso_8041_bursts", "Weighted r.m.s. of saw-tooth bursts", "Response to signal bursts",
-    "Saw teeth of 1 m/s2 with a period of 2 pi/100 s, for 60 s, at 20,000 samples a second.", _iso_8041_bursts,
-    items=(Item("ISO 8041 bursts", Word.AGREES,
-                "Wk agrees within 0.25 % and Wd within 1.5 % of the published three figures."),),
-    source="ISO 8041:2005, Human response to vibration: measuring instrumentation")
-
-STUDIES = (IRI_CHECK_PROFILE, GOLDEN_CAR_GAIN, ISO_2631_FACTORS, ISO_8041_BURSTS)
+STUDIES = (iri_check_profile, golden_car_gain, iso_2631_factors, iso_8041_bursts)
