@@ -49,29 +49,36 @@ from logger.store.formats.logger_csv import named_columns
 from logger.store.formats.mat_file import read_arrays
 from logger.store.formats.record_file import MAX_BYTES
 from logger.store.formats.vehicle_file import CarModel, read_model
-from logger.studies.study import Cell, Picture, Result, Table, Workload
+from logger.studies.study import Cell, Item, Picture, Result, Study, Table, Workload
 from logger.vehicle.compose import compose
 
 NOT_RUN = "Only a person can download the real files; ridelog's developers have not run them and make no claims."
 
 
-def from_folder(called: str, download: str, read: Callable[[Path, Workload], Result]) -> Callable[[Workload], Result]:
-    """A study's ``run`` that reads a folder: where that is not what it should be, it says where to download it.
+def study_of(called: str, download: str, title: str, where: str, how: str, *items: Item, source: str,
+             is_rig: bool = False) -> Callable[[Callable[[Path, Workload], Result]], Study]:
+    """Makes what reads a folder the study of its name: where that is not what it should be, it says where to download
+    it. A rig has a vehicle's file of its own.
 
-    ``read`` raises FileNotFoundError for a file that is not there, and BadInput for one that is something else.
+    The function raises FileNotFoundError for a file that is not there, and BadInput for one that is something else.
     """
-    def run(effort: Workload) -> Result:
-        if effort.folder is None or not effort.folder.is_dir():
-            found = "a file" if effort.folder is not None and effort.folder.exists() else "nothing there"
-            raise BadInput(f"{effort.folder}: expected a folder with {called}, found {found}: {download}")
-        if effort.vehicle is not None:
-            read_model(vehicle_path(effort.vehicle))  # refused now, not after an hour
-        try:
-            return read(effort.folder, effort)
-        except FileNotFoundError as error:
-            raise BadInput(f"{error}: {download}") from None
+    def of(read: Callable[[Path, Workload], Result]) -> Study:
+        def run(effort: Workload) -> Result:
+            if is_rig and effort.vehicle is not None:
+                raise BadInput(f"study: expected no --vehicle, as the rig is known, found {effort.vehicle}")
+            if effort.folder is None or not effort.folder.is_dir():
+                found = "a file" if effort.folder is not None and effort.folder.exists() else "nothing there"
+                raise BadInput(f"{effort.folder}: expected a folder with {called}, found {found}: {download}")
+            if effort.vehicle is not None:
+                read_model(vehicle_path(effort.vehicle))  # refused now, not after an hour
+            try:
+                return read(effort.folder, effort)
+            except FileNotFoundError as error:
+                raise BadInput(f"{error}: {download}") from None
 
-    return run
+        return Study(read.__name__, title, where, how, run, items, source, f"{called} ({download})")
+
+    return of
 
 
 def expected_files(folder: Path, pattern: str, what: str) -> list[Path]:
@@ -317,19 +324,6 @@ def verdict_of(parts: list[Compared], refused: list[str], repeat: str) -> str:
 
 
 _BLOCKS = 16  # of a spectrum: its levels are known to a quarter
-
-
-def rig_from_folder(called: str, download: str, read: Callable[[Path, Workload], Result]
-                    ) -> Callable[[Workload], Result]:
-    """As ``from_folder``, of a rig, which has a vehicle's file of its own."""
-    of_folder = from_folder(called, download, read)
-
-    def run(effort: Workload) -> Result:
-        if effort.vehicle is not None:
-            raise BadInput(f"study: expected no --vehicle, as the rig is known, found {effort.vehicle}")
-        return of_folder(effort)
-
-    return run
 
 
 def columns_in(folder: Path, pattern: str, what: str, names: Mapping[str, Sequence[str]]) -> list[Array]:

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from scipy.io import loadmat, savemat
 
-from logger.api.datasets.comma2k19 import STUDY as COMMA
+from logger.api.datasets.comma2k19 import comma2k19
 from logger.api.datasets.lira_cd import recordings
 from logger.commands.main import main
 from logger.errors import BadInput
@@ -240,4 +240,4 @@ def test_a_study_of_a_folder_needs_one() -> None:
     with pytest.raises(BadInput, match="study comma2k19: expected DIR, comma2k19"):
         main(["study", "comma2k19"])
     with pytest.raises(BadInput, match="expected a folder with comma2k19"):
-        COMMA.run(Workload())
+        comma2k19.run(Workload())

@@ -10,20 +10,29 @@ from pathlib import Path
 
 import numpy as np
 
-from logger.api.data_sets import DrivenWindows, RoadRecording, driven_windows, expected_files, from_folder
+from logger.api.data_sets import DrivenWindows, RoadRecording, driven_windows, expected_files, study_of
 from logger.chart_data import Array, Curves, Line
 from logger.errors import BadInput
 from logger.geodesy import east_and_north_m
 from logger.roads.iso8608 import iri_class
-from logger.studies.study import Item, Picture, Result, Study, Table, Word, Workload
+from logger.studies.study import Item, Picture, Result, Table, Word, Workload
 
 _CAR = "rav4-2009"
 _WINDOW_M = 25.0
 _LAGS_S = np.arange(-0.5, 0.51, 0.01)
 
 
-def run(folder: Path, effort: Workload) -> Result:
-    """As ``from_folder`` calls it."""
+@study_of(
+    "comma2k19",
+    "clone github.com/commaai/comma2k19 (MIT), which holds a segment in Example_1, or download the whole set",
+    "A minute of highway in a RAV4: from raw files to rows and a map", "Example_1",
+    "The segment is processed like any recording: extract --csv with the receiver's positions and speed, then estimate "
+    "with the noise learned. The device sat on the windscreen, where it feels pitch as well; the model's sensor sits "
+    "in the middle, unless --vehicle names another car. This was run on the real minute.",
+    Item("comma2k19", Word.NOT_REPRODUCIBLE, "No IRI of this minute was published; the receiver's speed lags the car's "
+                                             "and exceeds it, by the figures above."),
+    source="Schafer et al., arXiv:1812.05752, 2018")
+def comma2k19(folder: Path, effort: Workload) -> Result:
     log = expected_files(folder, "processed_log/IMU/accelerometer/value", "a segment's IMU")[0].parents[2]
     recording = segment(log)
     drives = driven_windows(recording, effort.vehicle or _CAR, (_WINDOW_M,))
@@ -108,14 +117,4 @@ def _map(drives: list[DrivenWindows]) -> Curves:
                   for name in dict.fromkeys((there[0], there[-1], *there)))
     return Curves("Map of the rows, by class of their IRI", "east [m]", "north [m]", lines, equal=True)
 
-
-_DOWNLOAD = "clone github.com/commaai/comma2k19 (MIT), which holds a segment in Example_1, or download the whole set"
-STUDY = Study(
-    "comma2k19", "A minute of highway in a RAV4: from raw files to rows and a map", "Example_1",
-    "The segment is processed like any recording: extract --csv with the receiver's positions and speed, then estimate "
-    "with the noise learned. The device sat on the windscreen, where it feels pitch as well; the model's sensor sits "
-    "in the middle, unless --vehicle names another car. This was run on the real minute.",
-    from_folder("comma2k19", _DOWNLOAD, run), (Item("comma2k19", Word.NOT_REPRODUCIBLE,
-    "No IRI of this minute was published; the receiver's speed lags the car's and exceeds it, by the figures above."),),
-    source="Schafer et al., arXiv:1812.05752, 2018", data=f"comma2k19 ({_DOWNLOAD})")
-STUDIES = (STUDY,)
+STUDIES = (comma2k19,)

@@ -25,7 +25,7 @@ from logger.shipped import vehicle_path
 from logger.store.formats.csv_table import columns_of
 from logger.store.formats.record_file import MAX_BYTES
 from logger.store.formats.vehicle_file import read_model
-from logger.studies.study import Item, Picture, Result, Study, Table, Word, Workload
+from logger.studies.study import Item, Picture, Result, Table, Word, Workload
 from logger.units import KMH_MPS
 
 _CAR = "sedan-2015"
@@ -54,8 +54,16 @@ class ProfiledRoad:
         return (self.left_m_per_km + self.right_m_per_km) / 2
 
 
-def run(folder: Path, effort: Workload) -> Result:
-    """As ``from_folder`` calls it."""
+@data_sets.study_of(
+    "LiRA-CD", "download LiRA-CD, doi 10.11583/DTU.c.6337148, and unpack it; AutoPi_CAN and ref_data are read",
+    "Electric cars against the road directorate's profiler, 10 m and 100 m", "IRI of P79",
+    "Each pass is processed like any recording (extract --csv, estimate with the noise learned). Its windows are "
+    "placed on the profiler's cells by GPS, then moved by up to 30 m to where they fit best. The parameters of the "
+    "cars (Renault Zoe) are not published: the model of a sedan replaces them, unless --vehicle names another. The "
+    "reader is tested on small files of the same layout.",
+    Item("LiRA-CD", Word.NOT_REPRODUCIBLE, data_sets.NOT_RUN),
+    source="Skar et al., LiRA-CD, Data in Brief, 2023")
+def lira_cd(folder: Path, effort: Workload) -> Result:
     files = data_sets.expected_files(folder, "platoon_*.hdf5", "the cars' records AutoPi_CAN/platoon_CPH1_HH.hdf5")
     parts: list[data_sets.Compared] = []
     refused: list[str] = []
@@ -224,14 +232,4 @@ def _repeats(road: ProfiledRoad, window_m: float) -> list[tuple[Any, ...]]:
                                          * cells))
     return rows
 
-
-_DOWNLOAD = "download LiRA-CD, doi 10.11583/DTU.c.6337148, and unpack it; AutoPi_CAN and ref_data are read"
-STUDY = Study(
-    "lira_cd", "Electric cars against the road directorate's profiler, 10 m and 100 m", "IRI of P79",
-    "Each pass is processed like any recording (extract --csv, estimate with the noise learned). Its windows are "
-    "placed on the profiler's cells by GPS, then moved by up to 30 m to where they fit best. The parameters of the "
-    "cars (Renault Zoe) are not published: the model of a sedan replaces them, unless --vehicle names another. The "
-    "reader is tested on small files of the same layout.",
-    data_sets.from_folder("LiRA-CD", _DOWNLOAD, run), (Item("LiRA-CD", Word.NOT_REPRODUCIBLE, data_sets.NOT_RUN),),
-    source="Skar et al., LiRA-CD, Data in Brief, 2023", data=f"LiRA-CD ({_DOWNLOAD})")
-STUDIES = (STUDY,)
+STUDIES = (lira_cd,)

@@ -13,14 +13,14 @@ from pathlib import Path
 
 import numpy as np
 
-from logger.api.data_sets import REPEAT_COLUMNS, WINDOWS_M, expected_files, from_folder, repeat_row
+from logger.api.data_sets import REPEAT_COLUMNS, WINDOWS_M, expected_files, repeat_row, study_of
 from logger.bounds import DISTANCE, LATITUDE, LONGITUDE, SIGNAL
 from logger.chart_data import Array, Curves, Line
 from logger.errors import BadInput
 from logger.extraction.along_track import ASIDE_M, MeasuredLine
 from logger.files import read_bounded
 from logger.roads.repeated_drives import best_shift_m, matching_cells, mean_between
-from logger.studies.study import Item, Picture, Result, Study, Table, Word, Workload
+from logger.studies.study import Item, Picture, Result, Table, Word, Workload
 
 PASSES = ("trip_iri_1ccf", "trip_iri_85e7", "trip_iri_e9ef")
 _COLUMNS = ("timestamp", "value", "lat", "lng")
@@ -52,8 +52,17 @@ class ProfilerPass:
         self.edges_m = np.append(at_m, 2 * at_m[-1] - at_m[-2])
 
 
-def run(folder: Path, effort: Workload) -> Result:
-    """As ``from_folder`` calls it."""
+@study_of(
+    "LiRA-Map", "clone github.com/peacefulotter/LiRA-Map (MIT); server/backup is read",
+    "How well a reference profiler repeats itself, 10 m and 100 m", "server/backup/trip_iri_*",
+    "Three passes over some 26 km of Danish road, by their positions. Their cells of 10 m begin at different places. "
+    "Nearest: each cell against the nearest one, up to 5 m off, which understates how alike they are. Aligned: means "
+    "of parts of two cells, smoother than the measured ones, which overstates it. The truth lies between. Moved piece "
+    "by piece they are even more alike, as each piece may follow the noise. This was run on the real files.",
+    Item("LiRA-Map", Word.NOT_REPRODUCIBLE,
+         "Run on the real files, it gives the ceiling that is shown with every other set; no paper gives it."),
+    source="peacefulotter/LiRA-Map, 2021")
+def lira_map(folder: Path, effort: Workload) -> Result:
     passes = [ProfilerPass(expected_files(folder, f"{name}.json*", "a pass of the profiler")[0]) for name in PASSES]
     pairs = list(effort.each(list(combinations(passes, 2))))
     tables: list[Table] = []
@@ -123,15 +132,4 @@ def _picture(passes: list[ProfilerPass]) -> Curves:
         lines.append(Line(one.name, begin_m / 1000, values))
     return Curves("Three passes, IRI over 100 m", "along the road [km]", "IRI [m/km]", tuple(lines))
 
-
-_DOWNLOAD = "clone github.com/peacefulotter/LiRA-Map (MIT); server/backup is read"
-STUDY = Study(
-    "lira_map", "How well a reference profiler repeats itself, 10 m and 100 m", "server/backup/trip_iri_*",
-    "Three passes over some 26 km of Danish road, by their positions. Their cells of 10 m begin at different places. "
-    "Nearest: each cell against the nearest one, up to 5 m off, which understates how alike they are. Aligned: means "
-    "of parts of two cells, smoother than the measured ones, which overstates it. The truth lies between. Moved piece "
-    "by piece they are even more alike, as each piece may follow the noise. This was run on the real files.",
-    from_folder("LiRA-Map", _DOWNLOAD, run), (Item("LiRA-Map", Word.NOT_REPRODUCIBLE,
-    "Run on the real files, it gives the ceiling that is shown with every other set; no paper gives it."),),
-    source="peacefulotter/LiRA-Map, 2021", data=f"LiRA-Map ({_DOWNLOAD})")
-STUDIES = (STUDY,)
+STUDIES = (lira_map,)

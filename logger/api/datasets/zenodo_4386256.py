@@ -18,7 +18,7 @@ from logger.errors import BadInput
 from logger.geodesy import EARTH_RADIUS_M
 from logger.store.formats.drive_file import write_table
 from logger.store.formats.mat_file import read_arrays, read_geopoint
-from logger.studies.study import Item, Picture, Result, Study, Word, Workload
+from logger.studies.study import Item, Picture, Result, Word, Workload
 
 _CAR = "sedan-2015"
 _BOTH = "road_elevation_NB_SB.mat"
@@ -49,8 +49,16 @@ class LaserRoad:
         write_table(path, ("distance_m", "elevation_m", "lat_deg", "lon_deg"), np.column_stack(columns), "%.10g")
 
 
-def run(folder: Path, effort: Workload) -> Result:
-    """As ``from_folder`` calls it."""
+@data_sets.study_of(
+    "Zenodo 4386256", "download doi 10.5281/zenodo.4386256 (CC0) and unpack it into one folder",
+    "Phones at 100 Hz against laser profiles, 10 m and 100 m", "Three roads",
+    "Each trip is processed like any recording: extract --csv --profile aligns it with the laser profile, by the "
+    "phone's positions and then by the road that the car felt. Then estimate compares its windows with the profile's "
+    "exact IRI. The cars' parameters are not published: the model of a sedan replaces them, unless --vehicle names "
+    "another. The reader is tested on small files of the same layout.",
+    Item("Zenodo 4386256", Word.NOT_REPRODUCIBLE, data_sets.NOT_RUN),
+    source="Botshekan et al., Zenodo 4386256, 2021")
+def zenodo_4386256(folder: Path, effort: Workload) -> Result:
     roads = laser_roads(folder)
     trips = [trip(one) for one in data_sets.expected_files(folder, "*-2019-*.mat", "the phones' trips")]
     found: list[tuple[str, data_sets.DrivenWindows]] = []
@@ -135,15 +143,4 @@ def _together(road: str,
         "begin_m", "iri_m_per_km", "iri_std_m_per_km", "exact_m_per_km"))
     return data_sets.Compared(road, window_m, begin_m, iri, std, exact)
 
-
-_DOWNLOAD = "download doi 10.5281/zenodo.4386256 (CC0) and unpack it into one folder"
-STUDY = Study(
-    "zenodo_4386256", "Phones at 100 Hz against laser profiles, 10 m and 100 m", "Three roads",
-    "Each trip is processed like any recording: extract --csv --profile aligns it with the laser profile, by the "
-    "phone's positions and then by the road that the car felt. Then estimate compares its windows with the profile's "
-    "exact IRI. The cars' parameters are not published: the model of a sedan replaces them, unless --vehicle names "
-    "another. The reader is tested on small files of the same layout.",
-    data_sets.from_folder("Zenodo 4386256", _DOWNLOAD, run),
-    (Item("Zenodo 4386256", Word.NOT_REPRODUCIBLE, data_sets.NOT_RUN),),
-    source="Botshekan et al., Zenodo 4386256, 2021", data=f"Zenodo 4386256 ({_DOWNLOAD})")
-STUDIES = (STUDY,)
+STUDIES = (zenodo_4386256,)

@@ -14,7 +14,7 @@ from logger.api.lab.compare import AddedEffect
 from logger.chart_data import Array
 from logger.errors import BadInput
 from logger.files import write_text
-from logger.studies.study import Item, Result, Statement, Study, Table, Value, Word, Workload
+from logger.studies.study import Item, Result, Statement, Table, Value, Word, Workload
 
 RATE_HZ = 1000.0
 DRIVE_N_PER_V = 35.15065
@@ -31,8 +31,16 @@ _NEAR, _SHOWN_S, _SKIP_S, _FEWEST_S = 0.01, 2.0, 2.0, 8.0
 EFFECT, FRICTION = "dry_friction", "friction_force_n"
 
 
-def run(folder: Path, effort: Workload) -> Result:
-    """As ``rig_from_folder`` calls it."""
+@data_sets.study_of(
+    "the EMPS record", "download the EMPS files from nonlinearbenchmark.org and unpack them; DATA_EMPS is read",
+    "A linear axis with friction: what its model lacks", "Parameters of the axis",
+    "The training record is written as a user would write it: a component that its bench moves (the encoder's "
+    "position) while its force is measured. The file knows the mass to 20 % and viscous friction to 50 %. Published "
+    "parameters are compared with those found with friction alone, as in the published model.",
+    Item("EMPS friction", Word.AGREES, "diagnose names Coulomb friction, which halves the error of the force."),
+    Item("EMPS parameters", Word.AGREES, "Mass, viscous and Coulomb friction within 1 %."),
+    source="A. Janot, M. Gautier, M. Brunot, Nonlinear System Identification Benchmarks, 2019", is_rig=True)
+def emps(folder: Path, effort: Workload) -> Result:
     force_n, place_m = _record(folder)
     count = effort.count(len(force_n), round(_FEWEST_S * RATE_HZ))
     steps = effort.each(["diagnosed", "simulated"])
@@ -86,16 +94,4 @@ def _beside(first: AddedEffect | None, ours: Sequence[float]) -> Table:
     return Table("Parameters of the axis", ("parameter", "published .5g", "ridelog .5g", "its standard error .2g",
                                             "difference [%] +.1f"), rows)
 
-
-_DOWNLOAD = "download the EMPS files from nonlinearbenchmark.org and unpack them; DATA_EMPS is read"
-STUDY = Study(
-    "emps", "A linear axis with friction: what its model lacks", "Parameters of the axis",
-    "The training record is written as a user would write it: a component that its bench moves (the encoder's "
-    "position) while its force is measured. The file knows the mass to 20 % and viscous friction to 50 %. "
-    "Published parameters are compared with those found with friction alone, as in the published model.",
-    data_sets.rig_from_folder("the EMPS record", _DOWNLOAD, run),
-    (Item("EMPS friction", Word.AGREES, "diagnose names Coulomb friction, which halves the error of the force."),
-     Item("EMPS parameters", Word.AGREES, "Mass, viscous and Coulomb friction within 1 %.")),
-    source="A. Janot, M. Gautier, M. Brunot, Nonlinear System Identification Benchmarks, 2019",
-    data=f"the EMPS record ({_DOWNLOAD})")
-STUDIES = (STUDY,)
+STUDIES = (emps,)

@@ -13,7 +13,7 @@ import numpy as np
 from logger.api import data_sets
 from logger.errors import BadInput
 from logger.files import write_text
-from logger.studies.study import Item, Result, Statement, Study, Table, Value, Word, Workload
+from logger.studies.study import Item, Result, Statement, Table, Value, Word, Workload
 
 RATE_HZ = 1e7 / 2**14
 FIT, TEST, ARROW = slice(40650, 40650 + 65062), slice(40650 + 65062, 127400), slice(100, 40575)
@@ -35,8 +35,18 @@ TESTS = (("Silverbox multisine", TEST), ("Silverbox arrow", ARROW), ("Silverbox 
 EFFECT = "progressive_spring"
 
 
-def run(folder: Path, effort: Workload) -> Result:
-    """As ``rig_from_folder`` calls it."""
+@data_sets.study_of(
+    "the Silverbox", "download SilverboxFiles.zip from nonlinearbenchmark.org and unpack it; SNLS80mV is read",
+    "A mass on a hardening spring: what its model lacks, and how well it then predicts",
+    "Errors of the benchmark's tests",
+    "The record is written as a user would write it: run folders with the force and the displacement. The file of a "
+    f"single mass knows mass and spring to 20 % and the damper to 50 %. The lab sees the first {FITTED} samples of the "
+    f"part for fitting, and nothing of the tests. The first {_SKIP} samples of each test are left out, as published.",
+    Item("Silverbox equation", Word.AGREES, "diagnose names the cubic spring of the circuit."),
+    *(Item(name, Word.BETTER, "The simulated output is closer to the record than that of the best published network.")
+      for name, _ in TESTS),
+    source="T. Wigren, J. Schoukens, ECC 2013; networks: M. D. Champneys et al., arXiv 2405.10779", is_rig=True)
+def silverbox(folder: Path, effort: Workload) -> Result:
     volts = np.column_stack(data_sets.columns_in(folder, "SNLS80mV.*", "the record SNLS80mV.csv or SNLS80mV.mat",
                                                 {"csv": ("V1", "V2"), "mat": ("V1", "V2")}))
     if len(volts) < TEST.stop:
@@ -80,18 +90,4 @@ def _verdict(found: data_sets.Improved, linear: list[float], better: list[float]
             f"{linear[1]:.2f} mV. Beyond a linear model it has {len(found.effects.rows)} fitted parameters, and it "
             "holds outside the amplitudes of the fit, where a black box has to extrapolate.")
 
-
-_DOWNLOAD = "download SilverboxFiles.zip from nonlinearbenchmark.org and unpack it; SNLS80mV is read"
-STUDY = Study(
-    "silverbox", "A mass on a hardening spring: what its model lacks, and how well it then predicts",
-    "Errors of the benchmark's tests", "The record is written as a user would write it: run folders with the force "
-    "and the displacement. The file of a single mass knows mass and spring to 20 % and the damper to 50 %. "
-    f"The lab sees the first {FITTED} samples of the part for fitting, and nothing of the tests. The "
-    f"first {_SKIP} samples of each test are left out, as published.",
-    data_sets.rig_from_folder("the Silverbox", _DOWNLOAD, run),
-    (Item("Silverbox equation", Word.AGREES, "diagnose names the cubic spring of the circuit."),
-     *(Item(name, Word.BETTER, "The simulated output is closer to the record than that of the best published network.")
-       for name, _ in TESTS)),
-    source="T. Wigren, J. Schoukens, ECC 2013; networks: M. D. Champneys et al., arXiv 2405.10779",
-    data=f"the Silverbox ({_DOWNLOAD})")
-STUDIES = (STUDY,)
+STUDIES = (silverbox,)
