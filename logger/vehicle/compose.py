@@ -29,7 +29,7 @@ from logger.vehicle.effect import (
 )
 from logger.vehicle.laws import CornerLaws, linear
 from logger.vehicle.models import structure_of
-from logger.vehicle.simulate import Passage, smooth
+from logger.vehicle.simulate import Passage
 from logger.vehicle.stepping import Motion, Stepper, begun, force_input
 from logger.vehicle.structure import (
     Forces,
@@ -246,15 +246,14 @@ def _axles(vehicle: Vehicle) -> list[Axle]:
 def fine_outputs(car: Car, passage: Passage, outputs: Sequence[Output]) -> Array:
     """Outputs at the fine instants (p, M)."""
     structure = passage.driven(car.structure)
-    inputs, means = passage.under_wheels(structure)
     if structure.held:
-        inputs = smooth(inputs, means)
+        inputs = passage.smooth_inputs(structure)
         matrices = np.stack([structure.stiffness, structure.damping, structure.mass])[:, 0, 0]
         force_n = inputs @ matrices + moved(car, passage).forces[:, 0]
         force_n += _friction_of_held(car.laws[0], inputs[:, 1], inputs[:, 2], passage.step_s)
         return np.tile(force_n, (len(outputs), 1))  # the one thing that is measured of it
     if car.bends_laws:
-        return _of_motion(structure, moved(car, passage), smooth(inputs, means), outputs)
+        return _of_motion(structure, moved(car, passage), passage.smooth_inputs(structure), outputs)
     return linear_outputs(structure, passage, outputs)
 
 
@@ -263,7 +262,7 @@ def linear_outputs(structure: Structure, passage: Passage, outputs: Sequence[Out
     observe, direct = structure.output_matrices(outputs)
     found = in_blocks(structure, passage, observe)
     if direct.any():  # what is felt on the body comes through springs and dampers alone
-        found += smooth(*passage.under_wheels(structure)) @ direct.T
+        found += passage.smooth_inputs(structure) @ direct.T
     return found.T
 
 

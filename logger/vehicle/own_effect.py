@@ -201,7 +201,7 @@ _TRIED = np.vstack([np.zeros(10), np.random.default_rng(1).uniform(-1, 1, (30, 1
 
 def _check_motion(law: MotionLaw) -> None:
     """ValueError for a law by all that moves that gives no numbers, or that a simulation could not ask."""
-    from logger.vehicle.stepping_loop import address_of, functions_of  # loads the compiler, if there is one
+    from logger.vehicle.stepping_loop import addresses_of, functions_of  # loads the compiler, if there is one
 
     if not isinstance(law.between, Between):
         raise ValueError(f"expected with_law to get one of {', '.join(map(str, Between))}, found {law.between!r}")
@@ -226,7 +226,7 @@ def _check_motion(law: MotionLaw) -> None:
                                      f"state, as in (rate,), found {found!r}")
                 for one in found:
                     _numbers("rates", one, np.zeros(()))
-    address_of(law)
+    addresses_of(law)
 
 
 def _is_number(value: Any) -> bool:

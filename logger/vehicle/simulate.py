@@ -122,9 +122,10 @@ class Passage:
         f_hz = np.arange(self._coarse * (self.steps if of_bench else 1) // 2) * rate_hz / self._coarse
         self._s = np.asarray(2j * np.pi * f_hz, dtype=complex)
         self._recorder = _recorder(self._coarse, of_bench or self.steps)
-        self._known: dict[tuple[Hashable, ...], tuple[Array, Array]] = {}
+        self._known: dict[Hashable, tuple[Array, Array]] = {}
         self._bodies: dict[Hashable, Complex] = {}
         self._beginnings: dict[Hashable, Any] = {}
+        self._smooth: tuple[Array | None, Array] = None, AT_REST
         self._cuts: dict[int, Passage] = {}
 
     @property
@@ -155,7 +156,7 @@ class Passage:
         known: B | None = self._beginnings.get(record_key)
         if known is None:
             known = find()
-            self._beginnings = dict([*self._beginnings.items()][-_KEPT_BODIES + 1 :]) | {record_key: known}
+            self._beginnings = _with_newest(self._beginnings, record_key, known, _KEPT_BODIES)
         return known
 
     @property
@@ -177,8 +178,16 @@ class Passage:
             heights = np.arange(elevation.shape[1]) < len(structure.wheels) * (not structure.held)
             level = elevation[0, 0] * heights
             known = elevation - level, mean - level
-            self._known = dict([*self._known.items()][-_KEPT_PLACES + 1 :]) | {place: known}
+            self._known = _with_newest(self._known, place, known, _KEPT_PLACES)
         return known
+
+    def smooth_inputs(self, structure: Structure) -> Array:
+        """Those at the fine instants, ``smooth``."""
+        inputs, means = self.under_wheels(structure)
+        found = self._smooth
+        if found[0] is not inputs:
+            found = self._smooth = inputs, smooth(inputs, means)
+        return found[1]
 
     @property
     def forces(self) -> Forces:
@@ -206,7 +215,7 @@ class Passage:
         transform = self._bodies.get(body)
         if transform is None:
             transform = self._transform(accelerations())
-            self._bodies = dict([*self._bodies.items()][-_KEPT_BODIES + 1 :]) | {body: transform}
+            self._bodies = _with_newest(self._bodies, body, transform, _KEPT_BODIES)
         return self._kept(transform, factor)
 
     def _transform(self, fine: Array) -> Complex:
@@ -230,6 +239,14 @@ class Passage:
     def sampled(self, fine: Array) -> Array:
         """Fine instants (M, ...) at the samples (N, ...), as they are."""
         return fine[(self._lead - self._mirrored) * self.steps :: self.steps][: self.count]
+
+
+def _with_newest(known: dict[Hashable, B], key: Hashable, newest: B, most: int) -> dict[Hashable, B]:
+    """A dict of the last so many, with one more. Its other keys, which may be long, are not hashed again."""
+    found = known | {key: newest}
+    while len(found) > most:
+        del found[next(iter(found))]
+    return found
 
 
 @lru_cache(maxsize=32)

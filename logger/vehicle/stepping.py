@@ -197,19 +197,19 @@ def _looked_at(one: _Rubs, ease: float) -> float:
 def _asked(structure: Structure, laws: Sequence[CornerLaws], way: Way, begins: Array) -> Asked:
     """Laws by all that moves as the loop reads them, their states (k,) begun so far from rest; where there are none it
     asks for no place and no time."""
-    from logger.vehicle.stepping_loop import ANSWERS, FELT, address_of, numbers_in_order
+    from logger.vehicle.stepping_loop import ANSWERS, FELT, addresses_of, numbers_in_order
 
     whole, numbers, memories = list[list[int]](), [0.0], list[list[float]]()
     for i, corner in enumerate(laws):
         for one in corner.motions:
-            whole.append([address_of(one), i, one.between.value, len(numbers), len(one.memory)])
+            whole.append([*addresses_of(one), i, one.between.value, len(numbers), len(one.memory)])
             numbers += numbers_in_order(one)
             memories.append([*one.memory, *[0.0] * (MOST_MEMORY - len(one.memory))])
     places, clock = np.empty((len(way.time_s), len(structure.behind_m))), np.empty((len(way.time_s), 3))
     if whole:
         places[:] = way.distance_m[:, None] - structure.behind_m
         clock.T[:] = way.time_s, np.gradient(way.distance_m, way.time_s), np.full(len(way.time_s), way.run)
-    law, states = np.array(whole, dtype=np.int64).reshape(-1, 5), np.array(memories, float).reshape(-1, MOST_MEMORY)
+    law, states = np.array(whole, dtype=np.int64).reshape(-1, 6), np.array(memories, float).reshape(-1, MOST_MEMORY)
     own = np.arange(MOST_MEMORY) < law[:, -1:]
     states[own] = begun(states[own], begins)
     return (law, np.array(numbers, float), np.zeros((len(whole), FELT)), states, np.zeros(FELT),

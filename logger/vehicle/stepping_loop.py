@@ -45,18 +45,20 @@ MEMORY_AT = len(Seen._fields) - 1
 """Where a law's states stand in what it feels: after all else that it sees."""
 FELT = MEMORY_AT + MOST_MEMORY
 """Numbers that a law may feel."""
-ANSWERS = 1 + MOST_MEMORY
-"""Numbers that it answers with: the force, then how fast its states grow."""
+ANSWERS = MOST_MEMORY
+"""Numbers that it answers with: the force, or how fast its states grow."""
 
 _KNOWN: list[Callable[[Array, Array, Array], None]] = []
 _KEPT: list[Any] = []  # compiled functions, which live as long as their addresses are known
 
 
-def address_of(law: MotionLaw) -> int:
-    """How the loop knows a law. ValueError as ``functions_of``, and for one that cannot be compiled."""
+def addresses_of(law: MotionLaw) -> list[int]:
+    """How the loop knows a law's force, and its rates (0: none). ValueError as ``functions_of``, and for one that
+    cannot be compiled."""
     functions = functions_of(law)
     _FUNCTIONS.update((one.__code__, one) for one in functions)
-    return _address(tuple(one.__code__ for one in functions), tuple(sorted(vars(law.p))), len(law.memory))
+    names, memory = tuple(sorted(vars(law.p))), len(law.memory)
+    return [*(_address(one.__code__, names, memory, one is law.rates) for one in functions), 0][:2]
 
 
 def functions_of(law: MotionLaw) -> list[Any]:
@@ -78,66 +80,60 @@ _FUNCTIONS: dict[CodeType, Any] = {}
 
 
 @cache
-def _address(codes: tuple[CodeType, ...], names: tuple[str, ...], memory: int) -> int:
-    """Of a law with these functions, numbers and states."""
-    force, *others = (_FUNCTIONS[code] for code in codes)
+def _address(code: CodeType, names: tuple[str, ...], memory: int, rates: bool) -> int:
+    """Of a function with such code of a law with these numbers and states: of its rates, or of its force."""
     numbers = namedtuple("numbers", names)  # type: ignore[misc]  # names are known only now
     if not COMPILED:
-        _KNOWN.append(_plain(force, others[0] if others else None, numbers, memory))
+        _KNOWN.append(_plain(_FUNCTIONS[code], numbers, memory, rates))
         return len(_KNOWN) - 1
-    compiled = _machine_code(force, others[0] if others else None, numbers, memory)
+    compiled = _machine_code(_FUNCTIONS[code], numbers, memory, rates)
     _KEPT.append(compiled)
     return int(compiled.address)
 
 
-def _plain(force: Any, rates: Any, numbers: Any, memory: int) -> Callable[[Array, Array, Array], None]:
+def _plain(function: Any, numbers: Any, memory: int, rates: bool) -> Callable[[Array, Array, Array], None]:
     def answer(given: Array, felt: Array, answers: Array) -> None:
         p = numbers(*given[: len(numbers._fields)])
         seen = Seen._make([*felt[:MEMORY_AT], tuple(felt[MEMORY_AT : MEMORY_AT + memory])])
-        answers[0] = force(p, seen)
-        if rates is not None:
-            answers[1 : 1 + memory] = rates(p, seen)
+        answers[: memory if rates else 1] = function(p, seen)
 
     return answer
 
 
-def _machine_code(force: Any, rates: Any, numbers: Any, memory: int) -> Any:
+def _machine_code(function: Any, numbers: Any, memory: int, rates: bool = False) -> Any:
     from numba.np.unsafe import ndarray
 
     size, first = len(numbers._fields), MEMORY_AT
     # Compiled code alone calls these: ways in from Python and C would take half of the time.
     inside: dict[str, Any] = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     compiled: Any = numba.njit(**inside)
-    own_force, own_rates = compiled(force), compiled(rates if rates is not None else force)
+    own = compiled(function)
     pointer = numba.types.CPointer(numba.types.float64)
     of_array: Any = ndarray.to_fixed_tuple
     all_seen: Any = Seen
 
     @compiled
-    def arguments(given: Any, felt: Any) -> Any:
+    def found(given: Any, felt: Any) -> Any:
         p = numbers(*of_array(numba.carray(given, (size,)), size))
         felt = numba.carray(felt, (FELT,))
-        return p, all_seen(*of_array(felt[:first], first), of_array(felt[first : first + memory], memory))
+        return own(p, all_seen(*of_array(felt[:first], first), of_array(felt[first : first + memory], memory)))
 
-    def force_alone(given: Any, felt: Any, answers: Any) -> None:
-        p, seen = arguments(given, felt)
-        answers[0] = own_force(p, seen)
+    def force(given: Any, felt: Any, answers: Any) -> None:
+        answers[0] = found(given, felt)
 
-    def force_and_rates(given: Any, felt: Any, answers: Any) -> None:
-        p, seen = arguments(given, felt)
-        answers[0] = own_force(p, seen)
-        found = own_rates(p, seen)
+    def growth(given: Any, felt: Any, answers: Any) -> None:
+        grown = found(given, felt)
         for index in range(memory):
-            answers[1 + index] = found[index]
+            answers[index] = grown[index]
 
-    answer: Any = CFunc(force_alone if rates is None else force_and_rates,
+    answer: Any = CFunc(growth if rates else force,
                         numba.core.sigutils.normalize_signature(numba.types.void(pointer, pointer, pointer)), {}, {})
-    said = [all_said(one) for one in (force, rates) if one is not None]
+    said = all_said(function)
     with global_compiler_lock:
         usual = FunctionIdentity._unique_ids
         try:
-            if None not in said:
-                digest = sha256(repr((said, numbers._fields, memory, Seen._fields)).encode()).hexdigest()[:32]
+            if said is not None:
+                digest = sha256(repr((said, numbers._fields, memory, rates, Seen._fields)).encode()).hexdigest()[:32]
                 answer._cache = _LawCache(answer._pyfunc, "law-" + digest)
                 # Numba counts from 1 on in each process what it compiles, and of two with one name takes either.
                 FunctionIdentity._unique_ids = count(int(digest, 16))
@@ -208,7 +204,7 @@ else:
 
 
 def ask(address: int, given: Array, first: int, felt: Array, answers: Array) -> None:
-    """Fill in a law's answers.
+    """Fill in a law's answers: its force, or its rates.
 
     given    numbers of all laws, its own from ``first`` on
     felt     (FELT,) what it sees; answers (ANSWERS,)
@@ -222,7 +218,7 @@ if COMPILED:
 
 Whole = npt.NDArray[np.int64]
 Asked = tuple[Whole, Array, Array, Array, Array, Array, Array, Array, Array]
-"""L laws by all that moves: whole numbers (L, 5); their own numbers, one after the other; what they felt at the
+"""L laws by all that moves: whole numbers (L, 6); their own numbers, one after the other; what they felt at the
 beginning of a step (L, FELT); their states (L, MOST_MEMORY), those of rest at first; room for what one feels (FELT,),
 feels in the middle of a step and how fast its states grow there (FELT + MOST_MEMORY,), and answers (ANSWERS,); the
 places of the wheels (M, w) and the times (M,)."""
@@ -261,8 +257,9 @@ PAIR, MOUNT_N_PER_M, MOUNT_LOW, MOUNT_PER_UNIT, DAMPING, TIRE_N_PER_M, TIRE_DAMP
 # where its rate stands in the motion and at which suspension and tire it is recorded (-1: at none).
 FRICTION_N, FRICTION_MPS, FRICTION_AT, STATIC_RATIO, STRIBECK_MPS = range(5)
 RATE_ROW, ON_SUSPENSION, ON_TIRE = range(3)
-# Whole numbers of a law: its address, wheel, what it acts on, where its numbers begin, and how many states it has.
-ADDRESS, WHEEL, BETWEEN, FIRST, STATES = range(5)
+# Whole numbers of a law: addresses of its force and rates, its wheel, what it acts on, where its numbers begin, and how
+# many states it has.
+FORCE, RATES, WHEEL, BETWEEN, FIRST, STATES = range(6)
 BODY_AND_WHEEL, WHEEL_AND_GROUND = 0, 1
 
 
@@ -424,16 +421,16 @@ def _remember(law: Whole, one: int, given: Array, began: Array, memories: Array,
         middle[c] = 0.5 * (began[one, c] + felt[c])
     for c in range(count):
         middle[MEMORY_AT + c] = 0.5 * (began[one, MEMORY_AT + c] + memories[one, c])
-    ask(law[one, ADDRESS], given, law[one, FIRST], middle, answers)
+    ask(law[one, RATES], given, law[one, FIRST], middle, answers)
     for c in range(count):
-        middle[FELT + c] = answers[1 + c]
+        middle[FELT + c] = answers[c]
     for c in range(count):
         here, rate, start = middle[MEMORY_AT + c], middle[FELT + c], began[one, MEMORY_AT + c]
         small = _SMALL_SHARE * abs(here) + _SMALL
         middle[MEMORY_AT + c] = here + small
-        ask(law[one, ADDRESS], given, law[one, FIRST], middle, answers)
+        ask(law[one, RATES], given, law[one, FIRST], middle, answers)
         middle[MEMORY_AT + c] = here
-        growth = (answers[1 + c] - rate) / small
+        growth = (answers[c] - rate) / small
         whole = growth * step_s
         share = 1.0 + 0.5 * whole if abs(whole) < _SLOW_DECAY else np.expm1(whole) / whole
         memories[one, c] = start + step_s * share * (rate - growth * (here - start))
@@ -453,7 +450,7 @@ def _begin(motion: Array, m: int, w: int, asked: Asked, road: Array, k: int) -> 
 def _push(forces: Array, w: int, law: Whole, one: int, given: Array, felt: Array, answers: Array) -> None:
     """Add the force of a law that feels this."""
     i, between = law[one, WHEEL], law[one, BETWEEN]
-    ask(law[one, ADDRESS], given, law[one, FIRST], felt, answers)
+    ask(law[one, FORCE], given, law[one, FIRST], felt, answers)
     # What pulls the body's end down is a pull between body and wheel and one on the wheel alone.
     if between != WHEEL_AND_GROUND:
         forces[i] += answers[0]

@@ -274,15 +274,17 @@ def test_a_compiled_law_answers_as_it_is_written() -> None:
     law = MotionLaw(Between.BODY_AND_WHEEL, force, values, rates, (0.0,))
     felt = np.linspace(-0.4, 0.6, stepping_loop.FELT)
     seen = Seen(*felt[: stepping_loop.MEMORY_AT], (felt[stepping_loop.MEMORY_AT],))
-    answers = np.zeros(stepping_loop.ANSWERS)
     given = np.array([9.0, *stepping_loop.numbers_in_order(law)])
-    stepping_loop.ask(stepping_loop.address_of(law), given, 1, felt, answers)
-    expected = force(values, seen), rates(values, seen)[0]
-    assert answers[:2] == pytest.approx(expected, rel=1e-12)
-    written = np.zeros(stepping_loop.ANSWERS)
     numbers = namedtuple("numbers", sorted(vars(values)))
-    stepping_loop._plain(force, rates, numbers, 1)(given[1:], felt, written)  # as it is asked without a compiler
-    assert written == pytest.approx(answers, rel=1e-12)
+    addresses = stepping_loop.addresses_of(law)
+    for address, function, expected in zip(addresses, (force, rates), (force(values, seen), *rates(values, seen)),
+                                           strict=True):
+        answers, written = np.zeros(stepping_loop.ANSWERS), np.zeros(stepping_loop.ANSWERS)
+        stepping_loop.ask(address, given, 1, felt, answers)
+        assert answers[0] == pytest.approx(expected, rel=1e-12)
+        as_it_is = stepping_loop._plain(function, numbers, 1, function is rates)  # as it is asked without a compiler
+        as_it_is(given[1:], felt, written)
+        assert written == pytest.approx(answers, rel=1e-12)
 
 
 SHARE, ARRAY = 1.5, np.array([1.0, 2.0])
@@ -314,7 +316,7 @@ def test_machine_code_is_kept_of_the_law_that_was_meant(tmp_path: Path, monkeypa
     def answer(law, number: str = "a") -> tuple[float, int]:
         """Of a process that asks this law first, and whether its code was there."""
         monkeypatch.setattr(FunctionIdentity, "_unique_ids", count(10**6))
-        made = stepping_loop._machine_code(law, None, namedtuple("numbers", number), 0)
+        made = stepping_loop._machine_code(law, namedtuple("numbers", number), 0)
         names.add(made.native_name)
         answers = np.zeros(stepping_loop.ANSWERS)
         stepping_loop.ask(made.address, np.array([10.0]), 0, np.linspace(0, 1, stepping_loop.FELT), answers)
