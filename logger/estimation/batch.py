@@ -22,7 +22,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from fractions import Fraction
 from functools import cache
-from math import ceil, exp, isfinite, sqrt
+from math import ceil, exp, isfinite, log, sqrt
 from typing import Any
 
 import numpy as np
@@ -105,8 +105,8 @@ def monotonic_distance(distance_m: Array, speed_mps: Array, rate_hz: float) -> A
     plus the moving mean over 2 s of what they differ from it."""
     driven = np.concatenate([[0.0], np.cumsum(0.5 * (speed_mps[1:] + speed_mps[:-1]))]) / rate_hz
     half = round(_SMOOTHED_S * rate_hz / 2)
-    sums = np.concatenate([[0.0], np.cumsum(np.pad(distance_m - driven, half, mode="edge"))])
-    mean = (sums[2 * half + 1:] - sums[: -2 * half - 1]) / (2 * half + 1)
+    about = np.full(2 * half + 1, 1 / (2 * half + 1))
+    mean = np.convolve(np.pad(distance_m - driven, half, mode="edge"), about, mode="valid")
     laid: Array = np.maximum.accumulate(driven + mean)
     return laid
 
@@ -127,14 +127,9 @@ def estimated(
     first = found[0].number if found else 0
     edges_m: Array = window_m * np.arange(first, first + len(found) + 1, dtype=np.float64)
     passed_s = np.interp(edges_m, distance_m, np.arange(count) / RATE_HZ)
-    return Windows(
-        edges_m,
-        np.diff(edges_m) / np.diff(passed_s),
-        np.array([one.iri_m_per_km for one in found]),
-        np.array([one.iri_std_m_per_km for one in found]),
-        np.array([one.resolved for one in found]),
-        tuple(one.flags for one in found),
-    ), road_profile(pieces)
+    return Windows(edges_m, np.diff(edges_m) / np.diff(passed_s), np.array([one.iri_m_per_km for one in found]),
+                   np.array([one.iri_std_m_per_km for one in found]), np.array([one.resolved for one in found]),
+                   tuple(one.flags for one in found)), road_profile(pieces)
 
 
 def learned_noise(
@@ -201,24 +196,17 @@ def score(windows: Windows, exact: Array, which: Bools) -> Score | None:
     if len(truth) == 0 or np.ptp(truth) == 0:
         return None
     in_errors = np.abs(error) / windows.iri_std_m_per_km[known]
-    return Score(
-        len(error),
-        float(1 - np.mean(error**2) / np.var(truth)),
-        float(np.mean(error) / np.mean(truth)),
-        float(np.mean(in_errors <= 1)),
-        float(np.mean(in_errors <= 2)),
-    )
+    return Score(len(error), float(1 - np.mean(error**2) / np.var(truth)), float(np.mean(error) / np.mean(truth)),
+                 float(np.mean(in_errors <= 1)), float(np.mean(in_errors <= 2)))
 
 
 def local_level(iri_m_per_km: Array, window_m: float) -> Array:
     """Mean IRI (n,) of the known ones within ``LEVEL_REACH_M`` of each window; NaN where there is none."""
     reach = round(LEVEL_REACH_M / window_m)
     known = np.isfinite(iri_m_per_km)
-    sums, counts = (np.concatenate([[0.0], np.cumsum(row)]) for row in (np.where(known, iri_m_per_km, 0.0), known))
-    place = np.arange(len(iri_m_per_km))
-    low, high = np.maximum(place - reach, 0), np.minimum(place + reach + 1, len(iri_m_per_km))
-    count = counts[high] - counts[low]
-    return np.where(count > 0, (sums[high] - sums[low]) / np.maximum(count, 1), np.nan)
+    sums, counts = (np.convolve(row, np.ones(2 * reach + 1))[reach: reach + len(row)]
+                    for row in (np.where(known, iri_m_per_km, 0.0), known))
+    return np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
 
 
 def least_errors(limits: ErrorBound, speed_mps: Array, level_m_per_km: Array) -> Array:
@@ -432,7 +420,7 @@ def assess(
         noise = learned_noise(car, gridded, window_m, readings, distance_m)
     if noise is not None:
         gridded, noise_log_std = Sensor(noise.noise_rms_mps2, gridded.step_mps2), noise.log_std
-        noise = noise.scaled((drive.rate_hz / RATE_HZ) ** 0.5)
+        noise = NoiseBelief(noise.log_mean + 0.5 * log(drive.rate_hz / RATE_HZ), noise.log_std)
         if gridded.step_mps2 != sensor.step_mps2:  # another rate has made one noise of both
             noise = noise.without_rounding(sensor.step_mps2)
         sensor = Sensor(noise.noise_rms_mps2, sensor.step_mps2)

@@ -87,10 +87,6 @@ class CarResponse:
             self._changes[key] = np.array([other / own - 1 for other in others]).reshape(-1, len(own))
         return self._changes[key]
 
-    def changed_power(self, speed_mps: float) -> Array:
-        """Mean square of what the gain from road to reading changes by, at ``WAVE_NUMBERS_CPM`` (n,) [1/s4]."""
-        return np.asarray(self.power(speed_mps) * (np.abs(self.changes(speed_mps)) ** 2).sum(axis=0))
-
 
 @dataclass(frozen=True)
 class SteadyMotion:

@@ -33,7 +33,6 @@ from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.time_grid import RATE_HZ
 from logger.roads.iri import PER_KM
-from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.linearise import KnownCar
 
 FINE_M = 0.05
@@ -79,7 +78,9 @@ class ErrorBound:
         """For a steady speed, above 0, on road of this spectrum."""
         psd = spectrum.psd(self._wave_number_cpm)
         car = self._car.at(speed_mps, WAVE_NUMBERS_CPM, spectrum.psd(WAVE_NUMBERS_CPM))
-        signal = self._gain_power(car, speed_mps) * psd
+        seen = self._wave_number_cpm * speed_mps <= HIGHEST_HZ
+        signal = np.zeros(len(psd))
+        signal[seen] = np.abs(car.response(self._wave_number_cpm[seen] * speed_mps, speed_mps)) ** 2 * psd[seen]
         resolved = signal / (signal + reading_noise_psd(self._variance, RATE_HZ, speed_mps))
         covariance = np.fft.irfft(self._slope_power * psd, self._count)
         covariance_resolved = np.fft.irfft(self._slope_power * psd * resolved, self._count)
@@ -88,14 +89,6 @@ class ErrorBound:
         best = self._window_variance(covariance_resolved / variance)
         mean = sqrt(2 / pi * variance)
         return Limit(PER_KM * mean, PER_KM * mean * sqrt(exact), PER_KM * mean * sqrt(max(exact - best, 0.0)))
-
-    def _gain_power(self, car: LinearCar, speed_mps: float) -> Array:
-        """Squared gain from road to reading, delays and contact patch included [1/s4]."""
-        n = self._wave_number_cpm
-        seen = n * speed_mps <= HIGHEST_HZ
-        power = np.zeros(len(n))
-        power[seen] = np.abs(car.response(n[seen] * speed_mps, speed_mps)) ** 2
-        return power
 
     def _window_variance(self, correlation: Array) -> float:
         """Variance of a window's mean of |y|, in units of the mean squared."""

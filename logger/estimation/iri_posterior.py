@@ -22,7 +22,6 @@ from logger.estimation.car_response import (
     golden_car_slope,
 )
 from logger.estimation.normal_distribution import mean_absolute, variance_of_mean_absolute
-from logger.estimation.road_solver import quick_fft_length
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.roads.iri import PER_KM
 
@@ -63,7 +62,8 @@ def vehicle_error_variance(
         gain = car.power(speed_mps) + off
         seen = gain > 0
         turned = _SLOPE_POWER[seen] / gain[seen]
-        density = max(density, float((car.changed_power(speed_mps) * road)[seen] @ turned / turned.sum()))
+        changed = car.power(speed_mps) * (np.abs(car.changes(speed_mps)) ** 2).sum(axis=0)
+        density = max(density, float((changed * road)[seen] @ turned / turned.sum()))
     return density * rate_hz / (2 * speed_mps)
 
 
@@ -139,15 +139,8 @@ class WindowIri:
     scatter: float
 
 
-def window_iri(
-    slope: Array,
-    unseen: Array,
-    rise: Array,
-    knowledge: SlopeKnowledge,
-    log_level_std: float,
-    length_m: float,
-    misplaced_m: float,
-) -> WindowIri:
+def window_iri(slope: Array, unseen: Array, rise: Array, knowledge: SlopeKnowledge, log_level_std: float,
+               length_m: float, misplaced_m: float) -> WindowIri:
     """IRI of the window whose estimated slopes are given from edge to edge.
 
     slope            (p,) at the points of the distance grid [m/m]
@@ -181,17 +174,8 @@ def window_iri(
 
 def by_slope(row: Array, spacing_m: float) -> Array:
     """Mean (n,) of a row (n,) along the road, with the shares that the variance of the Golden Car's slope at each point
-    has from there, on a closed grid."""
+    has from there, on a closed grid; of a block, whose last ``UNSEEN_M`` nobody drove, nothing goes round."""
     return np.fft.irfft(np.fft.rfft(row) * _memory_waves(spacing_m, len(row)), len(row))
-
-
-def unseen_share(seen: Array, spacing_m: float) -> Array:
-    """Share of the slope's variance at each point that comes from road not read, (p,) for ``seen`` (p,) 1 or 0."""
-    behind = len(_memory(spacing_m))
-    missing = np.concatenate([np.ones(behind), 1.0 - seen])
-    length = quick_fft_length(behind + len(missing))
-    share = np.fft.irfft(np.fft.rfft(missing, length) * _memory_waves(spacing_m, length), length)
-    return np.clip(share[behind: len(missing)], 0.0, 1.0)
 
 
 @lru_cache(maxsize=4)

@@ -21,6 +21,7 @@ from logger.arrays import Array
 from logger.estimation.car_response import SteadyMotion
 from logger.estimation.normal_distribution import within
 from logger.estimation.sensor_noise import Sensor
+from logger.estimation.time_grid import neighbours
 
 _KEPT = 0.3  # of the last round, so that rounds do not overshoot
 _TRIALS = 12
@@ -75,16 +76,17 @@ def cavity(motion: SteadyMotion, variance: Array) -> tuple[Array, Array]:
     the precisions as disorder.
     """
     precision = 1 / variance
-    trials, log_trials = _trials(variance)
+    log_trials = np.linspace(log(float(variance.min())), log(float(variance.max()) * 1.001), _TRIALS)
     # 1 / remaining - 1 / trial: what even readings say of an acceleration less what its own one does
-    log_others = log_trials - np.log(1 / motion.resolved_per_reading(trials) - 1)
+    log_others = log_trials - np.log(1 / motion.resolved_per_reading(np.exp(log_trials)) - 1)
     log_others += _LEAST_SLOPE * log_trials
     covariance = motion.covariance_left(1 / float(precision.mean()))
     alike = (covariance / covariance[0]) ** 2
-    about = _medium(len(variance), _MEDIUM_REACH * float(alike.sum()))
+    about = neighbours(len(variance), _MEDIUM_REACH * float(alike.sum()))
+    about = about / about[0]
     medium = np.maximum(np.fft.irfft(np.fft.rfft(precision) * about, len(variance)), precision.min())
     for _ in range(_EVENING_ROUNDS):
-        others = np.exp(_between_even(-np.log(medium), log_trials, log_others))
+        others = np.exp(np.interp(-np.log(medium), log_trials, log_others))
         left = 1 / (1 / others + medium)
         change = (precision - medium) / (1 + (precision - medium) * left)
         shared = np.fft.irfft(np.fft.rfft(change) * about, len(variance))
@@ -99,28 +101,6 @@ def cavity(motion: SteadyMotion, variance: Array) -> tuple[Array, Array]:
     return others, np.exp(np.interp(np.log(others), log_others, log_trials))
 
 
-def _medium(count: int, reach: float) -> Array:
-    """The rfft of how much each neighbour counts for the even readings about a place."""
-    lag = np.minimum(np.arange(count), count - np.arange(count))
-    kernel = np.exp(-0.5 * (lag / reach) ** 2)
-    return np.asarray(np.fft.rfft(kernel / kernel.sum()).real)
-
-
-def _trials(variance: Array) -> tuple[Array, Array]:
-    """Variances over the range of these (n,), and their logarithms, which are even."""
-    lowest, highest = log(float(variance.min())), log(float(variance.max()) * 1.001)
-    logs: Array = lowest + (highest - lowest) / (_TRIALS - 1) * np.arange(_TRIALS, dtype=np.float64)
-    return np.exp(logs), logs
-
-
-def _between_even(at: Array, places: Array, values: Array) -> Array:
-    """What ``np.interp`` gives, (n,) at places ``at`` (n,), quicker because the known places (k,) are even."""
-    steps = (at - places[0]) * ((len(places) - 1) / (places[-1] - places[0]))
-    below = np.clip(steps.astype(np.int64), 0, len(places) - 2)
-    share = np.clip(steps - below, 0.0, 1.0)
-    return values[below] + share * np.diff(values)[below]
-
-
 def without_own(readings: GaussianReadings, fitted_mps2: Array, fitted_variance: Array | float) -> tuple[Array, Array]:
     """What all other readings say of each acceleration: mean [m/s2] and variance [(m/s2)2], (t,); as ``improved``."""
     taken_out = np.minimum(1 / readings.variance, _MOST_OWN / fitted_variance)
@@ -128,10 +108,8 @@ def without_own(readings: GaussianReadings, fitted_mps2: Array, fitted_variance:
     return (fitted_mps2 / fitted_variance - readings.value_mps2 * taken_out) / others, 1 / others
 
 
-def improved(
-    readings: GaussianReadings, low: Array, high: Array, fitted_mps2: Array, fitted_variance: Array | float,
-    noise_variance: float
-) -> GaussianReadings:
+def improved(readings: GaussianReadings, low: Array, high: Array, fitted_mps2: Array, fitted_variance: Array | float,
+             noise_variance: float) -> GaussianReadings:
     """One round.
 
     low, high          (t,) bounds of each reading [m/s2]

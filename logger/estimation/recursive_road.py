@@ -14,7 +14,7 @@ from math import exp, log, pi
 import numpy as np
 
 from logger.arrays import Array, Bools, Complex
-from logger.estimation.car_response import SteadyMotion, steady_motion
+from logger.estimation.car_response import steady_motion
 from logger.estimation.iri_posterior import vehicle_error_variance
 from logger.estimation.level_response import RAISED_EVERY, RISE, Answer, LevelResponse
 from logger.estimation.other_motion import OtherMotion
@@ -96,16 +96,16 @@ class FollowedRoad:
     vehicle_error    share that each axle's gain may be off, because no file fits a car
     noise            what is believed of the sensor's noise, which is then learned; None: the sensor's is right, but
     noise_log_std    for this standard error of its logarithm
+
+    ``sensor`` then is as it is believed to be, and ``begun`` whether a block of this drive has been solved.
     """
 
-    def __init__(
-        self, sensor: Sensor, spacing_m: float, vehicle_error: float, noise: NoiseBelief | None = None,
-        noise_log_std: float = 0.0,
-    ) -> None:
+    def __init__(self, sensor: Sensor, spacing_m: float, vehicle_error: float, noise: NoiseBelief | None = None,
+                 noise_log_std: float = 0.0) -> None:
         self._vehicle_error, self._noise_log_std = vehicle_error, noise_log_std
         self._is_coarse, self._step_mps2 = sensor.is_coarse, sensor.step_mps2
         self._noise_is_all = self._is_coarse and noise is not None  # learned of bounds, it holds the car's own error
-        self._sensor = sensor
+        self.sensor = sensor
         self._spacing_m = spacing_m
         self._other = OtherMotion()
         self._drift = ScoredVariances(_COMMON_DRIFT, _DRIFT_LOG_STD)
@@ -121,7 +121,7 @@ class FollowedRoad:
 
     def restart(self) -> None:
         """Another drive begins: spectrum and noise are taken along, all that belongs to places is not."""
-        self._begun = False
+        self.begun = False
         self._gaussian: GaussianReadings | None = None
         self._centre_mps2, self._accel_variance = 0.0, 0.0
         self._beside_road = 0.0  # variance of what is in readings beside road and noise, as bounds count it
@@ -143,11 +143,6 @@ class FollowedRoad:
         """Time has passed since what was heard last: of the noise a little less is known."""
         if self._learner is not None:
             self._learner.next_drive()
-
-    @property
-    def sensor(self) -> Sensor:
-        """As it is believed to be now."""
-        return self._sensor
 
     @property
     def noise_stretches(self) -> int:
@@ -176,17 +171,12 @@ class FollowedRoad:
     def _take_over(self) -> None:
         """Go on with the noise that was learned. Where it blurs the steps, rounding is in it."""
         assert self._learner is not None
-        noise_mps2, before = self._learner.belief.noise_rms_mps2, self._sensor.variance_mps2_2
+        noise_mps2, before = self._learner.belief.noise_rms_mps2, self.sensor.variance_mps2_2
         if self._is_coarse:
             noise_mps2 = max(noise_mps2, _LEAST_SHARE_OF_STEP * self._step_mps2)
-        self._sensor = Sensor(noise_mps2, self._step_mps2 if self._is_coarse else 0.0)
+        self.sensor = Sensor(noise_mps2, self._step_mps2 if self._is_coarse else 0.0)
         if not self._is_coarse:
-            self._log_noise += log(before / self._sensor.variance_mps2_2)
-
-    @property
-    def begun(self) -> bool:
-        """A block of this drive has been solved."""
-        return self._begun
+            self._log_noise += log(before / self.sensor.variance_mps2_2)
 
     def move_on(self, fresh: RoadSamples) -> None:
         """The next block is without its oldest samples, and has these behind."""
@@ -197,14 +187,12 @@ class FollowedRoad:
         guess = self._expected_of(fresh)
         count = len(guess.variance)
         self._response.move_on(count)
-        self._gaussian = GaussianReadings(
-            np.concatenate([self._gaussian.value_mps2[count:], guess.value_mps2]),
-            np.concatenate([self._gaussian.variance[count:], guess.variance]),
-        )
+        self._gaussian = GaussianReadings(np.concatenate([self._gaussian.value_mps2[count:], guess.value_mps2]),
+                                          np.concatenate([self._gaussian.variance[count:], guess.variance]))
 
     def _expected_of(self, fresh: RoadSamples) -> GaussianReadings:
         """What readings say of accelerations of which no other tells yet: they go on as they were."""
-        low, high = bounds(fresh.reading_mps2.ravel(), fresh.at_end.ravel(), self._sensor.step_mps2)
+        low, high = bounds(fresh.reading_mps2.ravel(), fresh.at_end.ravel(), self.sensor.step_mps2)
         centre = np.full(len(low), self._centre_mps2)
         nothing = GaussianReadings(centre, np.full(len(low), np.inf))
         return improved(nothing, low, high, centre, self._accel_variance, self._noise_variance)
@@ -243,10 +231,10 @@ class FollowedRoad:
         how often the block is solved, which share rounds and steps, and ``is_last`` whether this is the last time."""
         rounds, steps = (_COARSE_ROUNDS // turns, _COARSE_STEPS) if self._is_coarse else (1, _STEPS // turns)
         most = rounds + _MORE_ROUNDS // turns if self._is_coarse else rounds
-        if not self._begun:
+        if not self.begun:
             rounds, most, steps = _FIRST_ROUNDS, _FIRST_ROUNDS, _FIRST_STEPS
-        before = self._spectrum if self._begun else None
-        self._begun = True
+        before = self._spectrum if self.begun else None
+        self.begun = True
         seen = block.seen(read)
         for done in range(1, most + 1):
             begun_with = copy(self)
@@ -307,7 +295,11 @@ class FollowedRoad:
         gain, ratio, free, even_share = solution.gain, np.ones(block.count), None, 1.0
         if self._is_coarse:
             motion = steady_motion(block.car, block.mean_speed_mps, self._spectrum, RATE_HZ, len(samples), reads)
-            solution = self._with_other_motion(solution, readings, weight, motion, learns and is_last)
+            residual = readings.value_mps2 - solution.fitted_mps2
+            if learns and is_last:
+                self._other.learn(residual, weight, motion)
+            self._other.find(residual, weight)
+            solution = replace(solution, fitted_mps2=solution.fitted_mps2 + self._other.motion_mps2)
             motion = self._other.beside(motion)
             relative = np.repeat(block.felt(local), reads)  # motion as strong as where it was felt
             others, even = (relative * row for row in cavity(motion, variance / relative))
@@ -366,30 +358,17 @@ class FollowedRoad:
         return SolvedBlock(solution.road, (solution.fitted_mps2 - solution.drift_mps2)[::reads],
                            mean_variance / reads / ratio, seen, np.exp(found), other_psd)
 
-    def _with_other_motion(
-        self, solution: Solution, readings: GaussianReadings, weight: Array, motion: SteadyMotion, learns: bool
-    ) -> Solution:
-        """The solution with what moves the car beside the road, as far as it leaves that; its spectrum follows where
-        it ``learns``."""
-        residual = readings.value_mps2 - solution.fitted_mps2
-        if learns:
-            self._other.learn(residual, weight, motion)
-        self._other.find(residual, weight)
-        return replace(solution, fitted_mps2=solution.fitted_mps2 + self._other.motion_mps2)
-
     def _as_gaussian(self, samples: RoadSamples) -> GaussianReadings:
         if not self._is_coarse:
-            noise = self._sensor.variance_mps2_2 * exp(self._log_noise)
+            noise = self.sensor.variance_mps2_2 * exp(self._log_noise)
             return GaussianReadings(samples.reading_mps2.ravel(), np.full(samples.reading_mps2.size, noise))
-        return first_guess(samples.reading_mps2.ravel(), self._sensor) if self._gaussian is None else self._gaussian
+        return first_guess(samples.reading_mps2.ravel(), self.sensor) if self._gaussian is None else self._gaussian
 
-    def _improved(
-        self, readings: GaussianReadings, samples: RoadSamples, read: Bools, solution: Solution, others: Array,
-        usable: Bools | None
-    ) -> GaussianReadings:
+    def _improved(self, readings: GaussianReadings, samples: RoadSamples, read: Bools, solution: Solution,
+                  others: Array, usable: Bools | None) -> GaussianReadings:
         """Another round for the bounds, with the variance (y,) that all other readings leave of each acceleration; the
         readings that are ``read`` (y,) count. The noise is learned of those that are ``usable`` (y,), if any."""
-        low, high = bounds(samples.reading_mps2.ravel(), samples.at_end.ravel(), self._sensor.step_mps2)
+        low, high = bounds(samples.reading_mps2.ravel(), samples.at_end.ravel(), self.sensor.step_mps2)
         others = others + unexplained(solution.fitted_mps2[read], low[read], high[read], self._noise_variance)
         fitted_variance = 1 / (1 / others + 1 / readings.variance)
         if usable is not None:
@@ -401,7 +380,7 @@ class FollowedRoad:
     @property
     def _noise_variance(self) -> float:
         """Of a reading about the road's part of it, before it is rounded [(m/s2)2]."""
-        return self._sensor.noise_rms_mps2**2 + self._beside_road
+        return self.sensor.noise_rms_mps2**2 + self._beside_road
 
     def _learn_from_bounds(self, expected: Array, others: Array, low: Array, high: Array, usable: Bools, reads: int
                            ) -> None:

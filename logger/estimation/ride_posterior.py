@@ -21,7 +21,7 @@ from logger.comfort.uncertain_ride import (
     larger,
     square_sum,
 )
-from logger.estimation.car_response import LOG_WAVES, WAVE_NUMBERS_CPM, CarResponse
+from logger.estimation.car_response import CarResponse, steady_motion
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.time_grid import frequencies_hz
@@ -106,11 +106,12 @@ class RidePosterior:
 
     def knowledge(self, place: RidePlace) -> tuple[RideKnowledge, RideKnowledge]:
         """At a place, and were the road there rougher by ``_LEVEL_TRIAL``."""
-        per_cpm = place.car.power(place.speed_mps) * place.spectrum.psd_of(LOG_WAVES)
-        road = np.interp(self._f_hz / place.speed_mps, WAVE_NUMBERS_CPM, per_cpm, left=0.0, right=0.0) / place.speed_mps
+        road = steady_motion(place.car, place.speed_mps, place.spectrum, self._rate_hz, _LINES).psd
         other: Array | float = 0.0
         if place.other_psd is not None:
-            other = np.interp(self._f_hz, frequencies_hz(self._count, self._rate_hz), _thinned(place.other_psd))
+            # Each frequency as the mean of its own neighbourhood, so that every second one has the power of all.
+            other = np.interp(self._f_hz, frequencies_hz(self._count, self._rate_hz),
+                              np.convolve(place.other_psd, (0.25, 0.5, 0.25), mode="same"))
         return self._known(road + other, place.variance), self._known(exp(_LEVEL_TRIAL) * road + other, place.variance)
 
     def _known(self, ride: Array, variance: float) -> RideKnowledge:
@@ -119,13 +120,9 @@ class RidePosterior:
         wiener_gain = ride / (ride + noise)
         step_hz = self._rate_hz / _LINES
         left = np.fft.irfft(self._power * wiener_gain * noise)[:self._lags] * self._rate_hz / 2
-        return RideKnowledge(
-            variance=float(self._power @ ride) * step_hz,
-            left=float(left[0]),
-            correlation=left / left[0],
-            noise_share=float((self._power * wiener_gain**2).mean()),
-            accel_variance=float(ride.sum()) * step_hz,
-        )
+        return RideKnowledge(variance=float(self._power @ ride) * step_hz, left=float(left[0]),
+                             correlation=left / left[0], noise_share=float((self._power * wiener_gain**2).mean()),
+                             accel_variance=float(ride.sum()) * step_hz)
 
     def sums(self, weighted_mps2: Array, inside: Bools, unread: Bools, place: RidePlace) -> RideSums | None:
         """What the figures of the samples ``inside`` (t,) of a block are made of; None where the ride hides between two
@@ -170,11 +167,6 @@ class RidePosterior:
             largest, before = running if largest is None else larger(largest, running, common), end
         assert largest is not None
         return RideSums(len(numbers), squares, fourths, largest, self._running)
-
-
-def _thinned(psd: Array) -> Array:
-    """With each frequency as the mean of its own neighbourhood, so that every second one has the power of all."""
-    return np.convolve(psd, (0.25, 0.5, 0.25), mode="same")
 
 
 def _deviation(knows: RideKnowledge, unread: Bools) -> Array:

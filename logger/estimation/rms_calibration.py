@@ -26,7 +26,7 @@ body, and the estimate scatters by a fifth to a third about the exact IRI. ``est
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import overload
+from typing import TypeVar
 
 import numpy as np
 import numpy.typing as npt
@@ -50,7 +50,9 @@ PASSENGER_KG = 75.0
 LEAST_WINDOW_M, MOST_WINDOW_M = 2.0, 200.0
 
 _ROAD_M = 1000.0
-_EVEN_WAVES = 400  # of a road, log-spaced; 5000 of them change no ratio by more than 0.01 %
+# Of a road, log-spaced; 5000 of them change no ratio by more than 0.01 %.
+_EVEN_CPM = np.geomspace(iso8608.LOWEST_CPM, iso8608.HIGHEST_CPM, 400)
+_Values = TypeVar("_Values", float, Array)
 _WITHIN = 68.0  # percentage of roads within one standard error
 # A quarter car has one of four wheels under it, a half car one side of the body.
 _SHARE_OF_LOAD = {"quarter_car": 0.25, "half_car": 0.5, "full_car": 1.0}
@@ -175,21 +177,22 @@ def fit(x: Array, y: Array, level: Array) -> RmsLine:
     return RmsLine(slope, float(standard_error), float(spread), float(r2))
 
 
-def _responses(
-    car: KnownCar, recorder_gain: Callable[[Array], Array] | None, wave_number: Array, speeds_mps: tuple[float, ...],
-    level_m_per_km: float,
-) -> Complex:
+def _responses(car: KnownCar, recorder_gain: Callable[[Array], Array] | None, wave_number: Array,
+               speeds_mps: tuple[float, ...], level_m_per_km: float) -> Complex:
     """Recorded acceleration, and the same weighted with Wk, per elevation (2, speeds, waves), on roads of this IRI. No
     delay of filters."""
-    speeds = np.array(speeds_mps)[:, None]
-    f_hz = speeds * wave_number
-    even = np.geomspace(iso8608.LOWEST_CPM, iso8608.HIGHEST_CPM, _EVEN_WAVES)
-    psd = iso8608.displacement_psd(even, iso8608.gd_n0_from_iri(level_m_per_km))
-    body = np.array([car.at(speed, even, psd).response(row, speed)
-                     for row, speed in zip(f_hz, speeds_mps, strict=True)])
-    if recorder_gain is not None:
-        body = body * recorder_gain(f_hz)
-    return np.stack([body, body * np.abs(WEIGHTING.response(f_hz))])
+    psd = iso8608.displacement_psd(_EVEN_CPM, iso8608.gd_n0_from_iri(level_m_per_km))
+    body = _recorded(car, recorder_gain, np.array(speeds_mps), wave_number, psd)
+    return np.stack([body, body * np.abs(WEIGHTING.response(np.array(speeds_mps)[:, None] * wave_number))])
+
+
+def _recorded(car: KnownCar, recorder_gain: Callable[[Array], Array] | None, speeds_mps: Array, wave_number: Array,
+              psd: Array) -> Complex:
+    """Recorded acceleration per elevation (speeds, waves), on roads of a spectrum at ``_EVEN_CPM``."""
+    f_hz = speeds_mps[:, None] * wave_number
+    body: Complex = np.array([car.at(speed, _EVEN_CPM, psd).response(row, speed)
+                              for row, speed in zip(f_hz, speeds_mps.tolist(), strict=True)])
+    return body if recorder_gain is None else np.asarray(body * recorder_gain(f_hz), np.complex128)
 
 
 class _Roads:
@@ -250,35 +253,23 @@ class RmsRelation:
     speeds_mps: Array
     iri_per_accel_rms: Array
 
-    @overload
-    def iri(self, accel_rms_mps2: float, speed_mps: float) -> float: ...
-    @overload
-    def iri(self, accel_rms_mps2: Array, speed_mps: Array | float) -> Array: ...
-    def iri(self, accel_rms_mps2: float | Array, speed_mps: float | Array) -> float | Array:
+    def iri(self, accel_rms_mps2: _Values, speed_mps: _Values) -> _Values:
         """IRI [m/km] of a road that shakes the car this much [m/s2] at this speed; NaN outside the table's speeds."""
         ratio = np.interp(speed_mps, self.speeds_mps, self.iri_per_accel_rms, left=np.nan, right=np.nan)
-        return accel_rms_mps2 * np.asarray(ratio)
+        result: _Values = accel_rms_mps2 * ratio
+        return result
 
 
-def rms_relation(
-    car: KnownCar,
-    recorder_gain: Callable[[Array], Array] | None = None,
-    speeds_mps: npt.ArrayLike = TABLE_SPEEDS_MPS,
-) -> RmsRelation:
+def rms_relation(car: KnownCar, recorder_gain: Callable[[Array], Array] | None = None,
+                 speeds_mps: npt.ArrayLike = TABLE_SPEEDS_MPS) -> RmsRelation:
     """The relation of a car (Fig 6.6), computed; of one whose laws are not linear, as it is on a common road.
 
     recorder_gain    magnitude of the recorder's whole response at frequencies [Hz]; None: it leaves all as it is
     speeds_mps       where to compute it, increasing [m/s]; between them a straight line is taken
     """
     speeds = np.asarray(speeds_mps, dtype=float)
-    wave_number = np.geomspace(iso8608.LOWEST_CPM, iso8608.HIGHEST_CPM, _EVEN_WAVES)
-    f_hz = speeds[:, None] * wave_number
-    psd = COMMON_ROAD.psd(wave_number)
-    gain = np.array([np.abs(car.at(float(speed), wave_number, psd).response(row, speed))
-                     for row, speed in zip(f_hz, speeds, strict=True)])
-    if recorder_gain is not None:
-        gain = gain * recorder_gain(f_hz)
-    trapezoid = wave_number * np.log(wave_number[1] / wave_number[0])  # dn of a log-spaced grid
+    gain = np.abs(_recorded(car, recorder_gain, speeds, _EVEN_CPM, COMMON_ROAD.psd(_EVEN_CPM)))
+    trapezoid = _EVEN_CPM * np.log(_EVEN_CPM[1] / _EVEN_CPM[0])  # dn of a log-spaced grid
     trapezoid[[0, -1]] *= 0.5
-    accel_rms = np.sqrt(gain**2 @ (iso8608.displacement_psd(wave_number, 1.0) * trapezoid))
+    accel_rms = np.sqrt(gain**2 @ (iso8608.displacement_psd(_EVEN_CPM, 1.0) * trapezoid))
     return RmsRelation(speeds, iso8608.iri_from_gd_n0(1.0) / accel_rms)

@@ -120,12 +120,11 @@ class Block:
         first_m = distance_m[0] - car.behind_m.max() - MARGIN_M
         self.start_m = float(np.floor(first_m / align_m) * align_m)
         self.count = quick_fft_length((distance_m[-1] + MARGIN_M + UNSEEN_M - self.start_m) / spacing_m)
-        self._waves = _waves_of(self.count, spacing_m)
-        self.wave_number_cpm, self.log_waves = self._waves.wave_number_cpm, self._waves.log_waves
+        self.wave_number_cpm, self.log_waves, self._log_n, self._averaged = _waves_of(
+            self.count, spacing_m, car.contact_patch_m)
         speed_mps = np.gradient(distance_m) * rate_hz
         # Not the highest speed: a single place that is wrong by metres must not cost the short waves of the block.
-        self._highest_cpm = HIGHEST_HZ / max(_quantile(speed_mps, _FAST_SHARE), SLOWEST_MPS)
-        self._averaged = _patch_gain_on_grid(self.count, car.contact_patch_m, spacing_m)
+        self._highest_cpm = HIGHEST_HZ / max(float(np.quantile(speed_mps, _FAST_SHARE)), SLOWEST_MPS)
         place = (distance_m - car.behind_m[:, None] - self.start_m) / spacing_m
         low = np.floor(place).astype(np.int64)
         self._front = low[0]
@@ -143,16 +142,8 @@ class Block:
         other.grid, other.car = grid, grid.car
         return other
 
-    def solve(
-        self,
-        reading_mps2: Array,
-        weight: Array,
-        spectrum: RoadSpectrum,
-        relative_variance: Array,
-        drift_variance: float,
-        steps: int,
-        start: Complex | None = None,
-    ) -> Solution:
+    def solve(self, reading_mps2: Array, weight: Array, spectrum: RoadSpectrum, relative_variance: Array,
+              drift_variance: float, steps: int, start: Complex | None = None) -> Solution:
         """The most probable road.
 
         reading_mps2    (y,) readings
@@ -260,7 +251,7 @@ class Block:
         found = np.flatnonzero(by_class)
         powers = [self.car.power(speed_mps) for speed_mps in np.exp((slowest + found) / _SPEED_CLASSES_PER_E).tolist()]
         total = by_class[found] @ np.array(powers).reshape(len(found), len(WAVE_NUMBERS_CPM))
-        gain: Array = np.interp(self._waves.log_n, _LOG_WAVE_NUMBERS, np.sqrt(total), right=0.0) ** 2
+        gain: Array = np.interp(self._log_n, _LOG_WAVE_NUMBERS, np.sqrt(total), right=0.0) ** 2
         return gain / max(self.seen_points(weight > 0), 1)
 
     def seen(self, read: Bools) -> Array:
@@ -328,35 +319,12 @@ class Block:
         return np.asarray(np.bincount(self._points.ravel(), (self._shares * back).ravel(), self.count), np.float64)
 
 
-def _quantile(row: Array, share: float) -> float:
-    """That of ``np.quantile``, without what makes it slow for short rows."""
-    place = share * (len(row) - 1)
-    below = int(place)
-    low, high = np.partition(row, (below, below + 1))[below:below + 2]
-    return float(low + (high - low) * (place - below))
-
-
-@dataclass(frozen=True)
-class _Waves:
-    """Those of a grid: wave numbers (k,) [cycle/m], ``log_waves`` of them, and the logarithms of those (k,) that
-    ``CarResponse`` knows."""
-
-    wave_number_cpm: Array
-    log_waves: Array
-    log_n: Array
-
-
 @lru_cache(maxsize=32)
-def _waves_of(count: int, spacing_m: float) -> _Waves:
-    """Kept, for there are few counts."""
-    wave_number_cpm = np.asarray(np.fft.rfftfreq(count, spacing_m), dtype=np.float64)
-    log_n = np.log(np.maximum(wave_number_cpm, WAVE_NUMBERS_CPM[0]))
-    return _Waves(wave_number_cpm, log_waves(wave_number_cpm), log_n)
-
-
-@lru_cache(maxsize=32)
-def _patch_gain_on_grid(count: int, contact_patch_m: float, spacing_m: float) -> Array:
-    return patch_gain(_waves_of(count, spacing_m).wave_number_cpm, contact_patch_m, spacing_m)
+def _waves_of(count: int, spacing_m: float, contact_patch_m: float) -> tuple[Array, Array, Array, Array]:
+    """Of a grid: wave numbers (k,) [cycle/m], ``log_waves`` of them, the logarithms of those (k,) that ``CarResponse``
+    knows, and ``patch_gain``; kept, for there are few counts."""
+    n = np.asarray(np.fft.rfftfreq(count, spacing_m), dtype=np.float64)
+    return n, log_waves(n), np.log(np.maximum(n, WAVE_NUMBERS_CPM[0])), patch_gain(n, contact_patch_m, spacing_m)
 
 
 def patch_gain(wave_number_cpm: Array, contact_patch_m: float, spacing_m: float) -> Array:

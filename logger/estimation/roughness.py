@@ -25,9 +25,10 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from logger.arrays import Array, Bools, Complex
+from logger.arrays import Array, Bools
 from logger.estimation.road_spectrum import COMMON_DEVIATIONS
 from logger.estimation.scored_variances import FORGOTTEN, LARGEST_STEP, ScoredVariances
+from logger.estimation.time_grid import neighbours
 
 LENGTHS_M = np.array([10.0, 100.0, 10_000.0])
 _COMMON_VARIANCES = np.array([0.05, 0.15])  # of the log variance, before a road is known; the last is that of levels
@@ -182,10 +183,10 @@ class RoadLevels:
         squares = innovations**2
         rows = np.stack([squares, resolved, squares - (resolved - freedom) * np.exp(log_before), freedom,
                          np.ones(count)]) * seen
-        neighbours = _neighbours(count, self._reach)
-        power, weight, squares, freedom, near = np.fft.irfft(np.fft.rfft(rows) * neighbours, count)
+        shares = _neighbours(count, self._reach)
+        power, weight, squares, freedom, near = np.fft.irfft(np.fft.rfft(rows) * shares, count)
         power, weight, freedom = (np.maximum(row, 0.0) for row in (power, weight, freedom))
-        self._learn_level(first, squares, freedom, seen / float(neighbours[0].real), learns)
+        self._learn_level(first, squares, freedom, seen / float(shares[0]), learns)
         level = self._levels(first, count)
         power = power * np.exp(-level)
         if learns:
@@ -257,11 +258,11 @@ class RoadLevels:
         """By how much the local means of a block scatter more than chance makes them: their variance less that of a
         weighted sum of squares of what has the correlation that the resolved shares give it (Isserlis)."""
         count = len(power)
-        neighbours = _neighbours(count, self._reach).real
+        near = _neighbours(count, self._reach)
         correlation = np.fft.irfft(gain / (1 + gain), count)
         if correlation[0] <= 0 or not power.any():
             return
-        chance = 2 * float(np.fft.irfft(neighbours**2, count) @ correlation**2) / (correlation[0] * neighbours[0]) ** 2
+        chance = 2 * float(np.fft.irfft(near**2, count) @ correlation**2) / (correlation[0] * near[0]) ** 2
         mean = float(weight[inside].mean())
         relative = power[inside] / np.maximum(weight[inside], _LEAST_OF_MEAN * mean)
         found = float(np.var(relative) / np.mean(relative) ** 2) - chance
@@ -286,11 +287,7 @@ def resolved_shares(strength: Array, gain: Array, seen: Array, free: float | Non
     return resolved, freedom
 
 
-@lru_cache(maxsize=32)
-def _neighbours(count: int, reach: float) -> Complex:
-    """The rfft of how much each neighbour of a point counts, on a grid of so many; kept, for there are few counts."""
-    lag = np.minimum(np.arange(count), count - np.arange(count))
-    return np.asarray(np.fft.rfft(np.exp(-0.5 * (lag / reach) ** 2)))
+_neighbours = lru_cache(maxsize=32)(neighbours)  # kept, for there are few counts and one reach
 
 
 @lru_cache(maxsize=16)

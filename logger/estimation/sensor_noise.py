@@ -117,10 +117,6 @@ class NoiseBelief:
         share = max(1 - step_mps2**2 / 12 / self.noise_rms_mps2**2, _LEAST_SHARE)
         return NoiseBelief(self.log_mean + 0.5 * log(share), min(self.log_std / share, UNKNOWN_LOG_STD))
 
-    def scaled(self, factor: float) -> NoiseBelief:
-        """Of readings with ``factor`` times the noise."""
-        return NoiseBelief(self.log_mean + log(factor), self.log_std)
-
 
 class NoiseLearner:
     """Follows the noise from stretch to stretch, from what was believed before.

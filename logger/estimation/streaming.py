@@ -23,7 +23,6 @@ from logger.estimation.iri_posterior import (
     reading_noise_psd,
     resolved_share,
     slope_knowledge,
-    unseen_share,
     window_iri,
 )
 from logger.estimation.recursive_road import FollowedRoad, SolvedBlock
@@ -106,7 +105,6 @@ class _Piece:
 class _Answers:
     """How the car answers the road, linear, and what follows from that."""
 
-    car: LinearCar
     response: CarResponse
     grid: TimeGrid
     bent: BentForces | None
@@ -134,24 +132,12 @@ class RoadEstimator:
     noise_log_std    of a noise that is not learned: standard error of its logarithm
     """
 
-    def __init__(
-        self,
-        car: KnownCar,
-        sensor: Sensor,
-        window_m: float,
-        place_std_m: float = 0.0,
-        vehicle_error: float = VEHICLE_ERROR,
-        on_road: Callable[[RoadPiece], None] | None = None,
-        late_std_s: float = 0.0,
-        noise: NoiseBelief | None = None,
-        ride_response: Callable[[Array], Complex] | None = None,
-        ride_ahead_m: float = 0.0,
-        off: Sequence[KnownCar] = (),
-        is_measured: bool = True,
-        driven_share: float = 1.0,
-        reads: int = 1,
-        noise_log_std: float = 0.0,
-    ) -> None:
+    def __init__(self, car: KnownCar, sensor: Sensor, window_m: float, place_std_m: float = 0.0,
+                 vehicle_error: float = VEHICLE_ERROR, on_road: Callable[[RoadPiece], None] | None = None,
+                 late_std_s: float = 0.0, noise: NoiseBelief | None = None,
+                 ride_response: Callable[[Array], Complex] | None = None, ride_ahead_m: float = 0.0,
+                 off: Sequence[KnownCar] = (), is_measured: bool = True, driven_share: float = 1.0, reads: int = 1,
+                 noise_log_std: float = 0.0) -> None:
         if reads > 1 and not sensor.is_coarse:
             raise ValueError("expected one reading per sample, as the noise blurs the steps")
         self._reads = reads
@@ -184,7 +170,7 @@ class RoadEstimator:
         if len(self._kept) >= _KEPT:
             del self._kept[next(iter(self._kept))]
         self._kept[car] = _Answers(
-            car, response, TimeGrid(response, BLOCK_SAMPLES, RATE_HZ, self._reads),
+            response, TimeGrid(response, BLOCK_SAMPLES, RATE_HZ, self._reads),
             BentForces(self._car, car, speed_mps, BLOCK_SAMPLES, RATE_HZ) if isinstance(self._car, MovedCar) else None)
         return self._kept[car]
 
@@ -300,7 +286,7 @@ class RoadEstimator:
             block, solved = self._solved_in_turns(block, samples, read)
         slope = np.fft.irfft(solved.road * golden_car_on_grid(block.count, self._spacing_m), block.count)
         elevation = np.fft.irfft(solved.road, block.count)
-        unseen = unseen_share(solved.seen, self._spacing_m)
+        unseen = np.clip(1 - by_slope(solved.seen, self._spacing_m), 0.0, 1.0)
         # The slope remembers the road shortly before a place.
         log_relative = np.log(np.maximum(by_slope(solved.relative_variance, self._spacing_m),
                                          solved.relative_variance.min()))
@@ -309,7 +295,7 @@ class RoadEstimator:
         for number in due:
             low = round((number * self._piece_m - block.start_m) / self._spacing_m)
             inside = slice(low, low + self._points + 1)
-            speed_mps = self._speed_mps(samples, number)
+            speed_mps = samples.speed_mps(number * self._piece_m, (number + 1) * self._piece_m)
             if low < 0 or speed_mps is None:
                 piece = _nothing(self._why_none(samples, number))
             else:
@@ -365,24 +351,14 @@ class RoadEstimator:
         inside[:round(ENTRY_S * RATE_HZ)] = False
         return self._ride.sums(weighted, inside, ~samples.read, place) if inside.any() else None
 
-    def _speed_mps(self, samples: RoadSamples, number: int) -> float | None:
-        return samples.speed_mps(number * self._piece_m, (number + 1) * self._piece_m)
-
     def _why_none(self, samples: RoadSamples, number: int) -> str:
         """The flag of a piece without an estimate: driven before the block began, or too slowly, or not read."""
-        gone = (number + 1) * self._piece_m <= samples.distance_m[0]
-        return "unsettled" if gone or self._speed_mps(samples, number) is not None else "faint"
+        begin_m, end_m = number * self._piece_m, (number + 1) * self._piece_m
+        gone = end_m <= samples.distance_m[0]
+        return "unsettled" if gone or samples.speed_mps(begin_m, end_m) is not None else "faint"
 
-    def _piece(
-        self,
-        slope: Array,
-        unseen: Array,
-        rise: Array,
-        speed_mps: float,
-        variance: float,
-        spectrum: RoadSpectrum,
-        log_level_std: float,
-    ) -> _Piece:
+    def _piece(self, slope: Array, unseen: Array, rise: Array, speed_mps: float, variance: float,
+               spectrum: RoadSpectrum, log_level_std: float) -> _Piece:
         knowledge = slope_knowledge(self._answers.response, speed_mps, spectrum, variance, RATE_HZ, self._spacing_m,
                                     self._points + 1)
         resolved = knowledge.resolved * (1 - float(unseen.mean()))

@@ -75,3 +75,9 @@ def at_readings(waves: Complex, count: int, reads: int) -> Array:
 def frequencies_hz(count: int, rate_hz: float) -> Array:
     """Those of the rfft of ``count`` samples (count // 2 + 1,) [Hz]; kept, for there are few counts."""
     return np.asarray(np.fft.rfftfreq(count, 1 / rate_hz), dtype=np.float64)
+
+
+def neighbours(count: int, reach: float) -> Array:
+    """The rfft of how much each neighbour of a point counts, on a closed grid of so many: exp(-(lag / reach)^2 / 2)."""
+    lag = np.minimum(np.arange(count), count - np.arange(count))
+    return np.asarray(np.fft.rfft(np.exp(-0.5 * (lag / reach) ** 2)).real)
