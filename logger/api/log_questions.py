@@ -10,9 +10,9 @@ from typing import Annotated
 from drivers.catalogue import names
 from logger.api.shared_fields import Localized, limit_of
 from logger.question import LIMIT, Argument, Option, Out, Question, Range, Verb, Verbs
-from logger.units import FOOT_M, LENGTH_UNITS_M
+from logger.units import LENGTH_UNITS_M, WINDOW_M
 
-LEAST_M, MOST_M = 25 * FOOT_M, 100_000.0
+MOST_M = 100_000.0
 SYSTEMS = ("si", "us")
 FORMATS = tuple(f".{name}" for name in names("logger.exchange.formats", "FORMAT"))
 
@@ -25,8 +25,8 @@ def length_of(length: str | float) -> float:
         length_m = float(found[1]) * LENGTH_UNITS_M[found[2]] if found else 0.0
     except ValueError:
         length_m = 0.0
-    if not LEAST_M <= length_m <= MOST_M:
-        raise ValueError(f"expected a length with its unit, such as 100m, 0.1mi or 500ft, from {LEAST_M:g} m to "
+    if not WINDOW_M <= length_m <= MOST_M:
+        raise ValueError(f"expected a length with its unit, such as 100m, 0.1mi or 500ft, from {WINDOW_M:g} m to "
                          f"{MOST_M / 1000:g} km")
     return length_m
 

@@ -10,13 +10,14 @@ import numpy as np
 
 from logger.arrays import Array, Complex
 from logger.dsp.filters import kaiser_half_length, low_pass_taps
+from logger.dsp.resample import PASS_OF_RATE
 from logger.profiles.track import Way, WheelTracks
 from logger.vehicle.structure import AT_REST, Forces, Structure, pushed
 
 FINE_RATE_HZ = 1000.0
 """A car is simulated in at least so many steps a second."""
-PASS_OF_RATE, STOP_OF_RATE = 0.38, 0.5
-"""The recorder's filter is flat below the one and silent above the other share of its rate."""
+STOP_OF_RATE = 0.5
+"""The recorder's filter is flat below ``PASS_OF_RATE`` and silent above this share of its rate."""
 STOP_DB = 80.0
 _HALF_SAMPLES = ceil(kaiser_half_length(STOP_DB, 2 * np.pi * (STOP_OF_RATE - PASS_OF_RATE)))
 # The recorder's gain is read off a transform of so many points of its filter at so many times its rate.

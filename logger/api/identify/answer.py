@@ -51,6 +51,7 @@ from logger.question import function
 from logger.report.blocks import Blocks, Lines, Table
 from logger.report.quantities import known as known_number
 from logger.report.quantities import measured, unit_of
+from logger.roads.iso8608 import STANDARD_WAVINESS
 from logger.runs import Run as Record
 from logger.runs import no_readings, past_of, runs_left_out, zero_is_known
 from logger.simulation.virtual_drive import SimulatedRuns
@@ -71,7 +72,6 @@ from logger.vehicle.named_parameters import (
 from logger.vehicle.uncertain import UNKNOWN, Known, NumberErrors
 from logger.vehicle.vehicle import Vehicle
 
-USUAL_WAVINESS = 2.0
 _FREE_WAVINESS = "road.waviness"
 # By how much the distances of two drives over one road may disagree.
 _PLACES_OFF_M, _SCALE_OFF = 10.0, 0.01
@@ -430,7 +430,7 @@ def _road_options(question: IdentifyQuestion) -> tuple[RoadOptions, IdentifyQues
         raise question.wrong(given[0], ": expected a road whose profile is known, found one that was not measured")
     free = question.free or ()
     names = [name for name in free if name != _FREE_WAVINESS]
-    return (Options(waviness=question.waviness or USUAL_WAVINESS, free_waviness=_FREE_WAVINESS in free,
+    return (Options(waviness=question.waviness or STANDARD_WAVINESS, free_waviness=_FREE_WAVINESS in free,
                     place_off_m=_PLACES_OFF_M, scale_off=_SCALE_OFF), replace(question, free=names))
 
 

@@ -339,8 +339,6 @@ def _advice(run: Run, car: Car, band_hz: tuple[float, float]) -> str:
 
 
 _SAME_RATE = 1e-3  # times that are written to a millisecond leave the rate of a few seconds so uncertain
-# What the lab looks at of a car lies below 40 Hz: a record of nearly twice this rate or more is thinned to about it.
-_RATE_HZ, _NEARLY = 100.0, 0.25
 _LEAST_OF_PART_S = 1.0  # a damper's bench makes five turns a second
 _CLIPPED_SHARE = 0.005  # of a record: fewer are a blow or two (a judgement)
 _DIES_DOWN = 0.95  # of the r.m.s.: a damping ratio of 0.3 % does so within six periods (a judgement)
@@ -564,7 +562,7 @@ def thinned_runs(runs: Sequence[Run], vehicle: Vehicle | None = None) -> list[Ru
     so that its record goes through the filter that its model goes through.
     """
     def factor_to(needed_hz: float) -> int:
-        return int(runs[0].rate_hz / needed_hz + _NEARLY)
+        return int(runs[0].rate_hz / needed_hz + 0.25)  # nearly twice as many are thinned as well
 
     factor = factor_to(_needed_hz(vehicle))
     if factor > 1 and vehicle is not None and runs[0].timed:
@@ -613,9 +611,10 @@ def _thinned_marks(usable: Array | None, factor: int) -> Array | None:
 def _needed_hz(vehicle: Vehicle | None) -> float:
     """Samples a second that the lab needs: what it looks at reaches an octave above the vehicle's quickest vibration.
     """
+    enough_hz = 100.0  # for most: what the lab looks at of a car lies below 40 Hz
     if vehicle is None:
-        return _RATE_HZ
-    return max(_RATE_HZ, 2 * float(undamped_frequencies_hz(structure_of(vehicle))[-1]) / HIGHEST_OF_RATE)
+        return enough_hz
+    return max(enough_hz, 2 * float(undamped_frequencies_hz(structure_of(vehicle))[-1]) / HIGHEST_OF_RATE)
 
 
 def _least_hz(drive: Drive, vehicle: Vehicle | None) -> tuple[float, str]:

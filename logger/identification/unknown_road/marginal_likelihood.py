@@ -135,7 +135,8 @@ def at_n0(waviness: float) -> float:
     return float((REFERENCE_N0_CPM / PIVOT_CPM) ** -waviness)
 
 
-_SHORTEST_CPM = 4.0
+SHORTEST_CPM = 4.0
+"""The shortest waves that count, as long as a tire's contact."""
 _PER_WAVE, _SPACING_M = 2.5, (0.08, 0.3)
 
 
@@ -147,7 +148,7 @@ class UnknownRoad:
         self._car, self._options = car, options
         self._cars = [car] * len(drives)
         highest = max(_highest_cpm(drive) for drive in drives)
-        spacing_m = float(np.clip(1 / (_PER_WAVE * min(highest, _SHORTEST_CPM)), *_SPACING_M))
+        spacing_m = float(np.clip(1 / (_PER_WAVE * min(highest, SHORTEST_CPM)), *_SPACING_M))
         scale_off = options.scale_off * (len(drives) > 1)
         self.grid = grid_under(drives, car.behind_m, spacing_m, options.place_off_m, scale_off)
         self.drives = drives

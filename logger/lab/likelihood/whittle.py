@@ -37,7 +37,7 @@ BLOCK_S = 3.0
 """Length of a block of Welch's method: a resolution of a third of a hertz, where the narrowest band has 0.6."""
 HIGHEST_OF_RATE = 0.37
 """Share of the rate up to which records are compared: above it recorders' filters differ. Below
-``simulate.PASS_OF_RATE``, up to which a usual filter is flat."""
+``resample.PASS_OF_RATE``, up to which a usual filter is flat."""
 LOWEST_HZ = 0.4
 """Accelerations are not compared below: a car hardly accelerates there, and sensors drift."""
 # Least noise: of the sensor's acceleration, and of another signal as a share of its own deviation. No sensor has less

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from logger.dsp.resample import PASS_OF_RATE
 from logger.lab.residual_tests.tests import (
     LEAST_SHARE,
     ResidualEvidence,
@@ -15,7 +16,6 @@ from logger.lab.residuals.road_coherence import coherence_with_road
 from logger.lab.residuals.statistics import band_pass, block_means, mean_of_blocks
 from logger.printable import percent
 from logger.runs import are_on_rig
-from logger.vehicle.simulate import PASS_OF_RATE
 
 
 class CoherenceTest(ResidualTest):

@@ -14,12 +14,12 @@ from itertools import pairwise
 import numpy as np
 
 from logger.arrays import Array, Complex
+from logger.dsp.resample import PASS_OF_RATE
 from logger.lab.likelihood.lag import WINDOW_S
 from logger.runs import Run, are_on_rig
 from logger.vehicle.compose import Car, Response
 from logger.vehicle.models import structure_of
 from logger.vehicle.modes import body_and_wheels_hz
-from logger.vehicle.simulate import PASS_OF_RATE
 
 INDEPENDENT_S = 1.0
 """Residuals so far apart count as independent: a body that bounces at 1 Hz with a third of its critical damping keeps

@@ -16,12 +16,13 @@ import numpy as np
 
 from logger.arrays import Array
 from logger.dsp.linear_prediction import levinson
+from logger.dsp.resample import PASS_OF_RATE
 from logger.identification.noise_models import autocorrelation, autocorrelations
 from logger.lab.residuals.breakdown import ModelResiduals
 from logger.runs import SENSOR
 from logger.simulation.virtual_drive import output_of
 from logger.vehicle.linear_car import LinearCar
-from logger.vehicle.simulate import PASS_OF_RATE, smooth_length
+from logger.vehicle.simulate import smooth_length
 
 Shape = Callable[[Array, Array], Array]
 

@@ -13,6 +13,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
+from logger.dsp.resample import PASS_OF_RATE
 from logger.fitting.information_matrix import integrated_out, inverse
 from logger.identification.identifiability import NOT_ONE_ROAD, Finding, structural
 from logger.lab.diagnosis import CandidateEffect, candidates_of
@@ -39,7 +40,6 @@ from logger.lab.unknown_road.same_road import (
 )
 from logger.vehicle.effect import Chosen, DriveEffect, Effect, ForceEffect, Misalignment, RoadEffect, chosen
 from logger.vehicle.named_parameters import free_parameters_of
-from logger.vehicle.simulate import PASS_OF_RATE
 
 Progress = Callable[[str], None]
 

@@ -43,11 +43,13 @@ from itertools import pairwise, permutations
 import numpy as np
 
 from logger.arrays import Array, Complex
+from logger.dsp.resample import PASS_OF_RATE
 from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM
 from logger.fitting.fisher_scoring import maximise
 from logger.fitting.information_matrix import inverse
 from logger.identification.unknown_road.marginal_likelihood import (
     OFFSET,
+    SHORTEST_CPM,
     WAVINESS,
     Options,
     Roads,
@@ -77,7 +79,7 @@ from logger.vehicle.named_parameters import (
     steps_of,
     with_coordinates,
 )
-from logger.vehicle.simulate import PASS_OF_RATE, recorder_gain
+from logger.vehicle.simulate import recorder_gain
 from logger.vehicle.structure import Output
 from logger.vehicle.vehicle import Vehicle
 
@@ -117,12 +119,10 @@ class DriveConditions:
     waviness: float
 
 
-def responses_of(car: Car, rate_hz: float, motions: Sequence[DriveConditions], highest_cpm: float = 4.0) -> Complex:
+def responses_of(car: Car, rate_hz: float, motions: Sequence[DriveConditions]) -> Complex:
     """Readings as ``response_of`` for each of some motions (d, x, f): of the linear car that comes nearest to one that
-    is not linear, the same for all of one that is.
-
-    highest_cpm    a suspension is moved by waves of the road from those below which its spectrum is flat to those as
-                   short as a tire's contact
+    is not linear, the same for all of one that is. A suspension is moved by waves of the road from those below which
+    its spectrum is flat to those as short as a tire's contact.
 
     ValueError for effects on the record in time, and for laws that are others at another place or time.
     """
@@ -132,7 +132,7 @@ def responses_of(car: Car, rate_hz: float, motions: Sequence[DriveConditions], h
         raise ValueError("expected a car whose record is what its sensor felt")
     known_car(car)  # refuses laws that no linear ones stand in for
     output = Output(car.row, np.zeros(len(car.structure.wheels)), 2)
-    moving_cpm = np.geomspace(FLATTENED_BELOW_CPM, highest_cpm, 80)
+    moving_cpm = np.geomspace(FLATTENED_BELOW_CPM, SHORTEST_CPM, 80)
     found = []
     for motion in motions:
         psd_m3 = displacement_psd_m3(motion.level, motion.waviness, np.append(0.0, moving_cpm))[1:]
