@@ -186,7 +186,7 @@ class RoadLevels:
         shares = _neighbours(count, self._reach)
         power, weight, squares, freedom, near = np.fft.irfft(np.fft.rfft(rows) * shares, count)
         power, weight, freedom = (np.maximum(row, 0.0) for row in (power, weight, freedom))
-        self._learn_level(first, squares, freedom, seen / float(shares[0]), learns)
+        self._learn_level(first, squares, freedom, weight, seen / float(shares[0]), learns)
         level = self._levels(first, count)
         power = power * np.exp(-level)
         if learns:
@@ -197,7 +197,8 @@ class RoadLevels:
         self._scale_error = 2 / (self._common + weight)
         self._excess = 0.5 * self._scale_error * (weight - self._common) / (weight + self._common)
 
-    def _learn_level(self, first: int, squares: Array, freedom: Array, each: Array, learns: bool) -> None:
+    def _learn_level(self, first: int, squares: Array, freedom: Array, weight: Array, each: Array, learns: bool
+                     ) -> None:
         """One step for L of the cells that are seen and those behind them; of points, ``each`` (n,) counts as a part of
         a neighbourhood."""
         cells = (first + np.arange(len(squares))) // self._cell
@@ -216,7 +217,9 @@ class RoadLevels:
         mean = state @ since
         prior = np.tensordot(self.variances, alike, 1) + since.T @ (state_covariance - np.diag(self.variances)) @ since
 
-        relative = squares[chosen] * np.exp(-now[at])
+        # A hole that lies elsewhere than it was thought to says nothing of the level, however large it was thought: at
+        # least what is found of a road of this level whose innovations are nothing.
+        relative = np.maximum(squares[chosen] * np.exp(-now[at]), np.minimum(freedom - weight, 0.0)[chosen])
         freedom, half = freedom[chosen], 0.5 * self._common * each[chosen]
         slope = np.bincount(at, half * (relative - freedom) / (self._common + np.maximum(relative, 0.0)), total)
         bend = np.maximum(np.bincount(at, half * freedom / (self._common + freedom), total), _LEAST_INFORMATION)

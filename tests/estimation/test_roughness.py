@@ -270,6 +270,21 @@ def test_readings_that_tell_nothing_teach_nothing() -> None:
     assert found.solved_with(0, 256) == pytest.approx(np.zeros(256), abs=1e-4)
 
 
+def test_a_hole_that_was_looked_for_elsewhere_makes_no_road_smooth() -> None:
+    """Innovations of a common road of which little is resolved, while one point was believed to be a large hole: it is
+    not there. The level, and how much levels are believed to differ, stay."""
+    rng, gain, found = np.random.default_rng(6), np.geomspace(1e-7, 0.3, 513), RoadLevels(SPACING_M)
+    shares = np.sqrt(gain / (1 + gain))
+    for number in range(30):
+        innovations = np.fft.irfft(shares * np.fft.rfft(rng.standard_normal(1024)), 1024)
+        believed = np.zeros(1024)
+        believed[100 + 25 * number] = 16.0
+        innovations[100 + 25 * number] = 0.0
+        found.learn(0, innovations, believed, gain, np.ones(1024), learns=True)
+    assert found.solved_with(0, 1024).mean() == pytest.approx(0.0, abs=1.0)
+    assert found.variances.max() < 4
+
+
 def test_less_power_than_expected_makes_a_road_as_much_smoother_as_more_makes_it_rougher() -> None:
     """Readings that resolve little, of a road as rough as believed: the mean over many draws stays where it is."""
     rng = np.random.default_rng(4)
