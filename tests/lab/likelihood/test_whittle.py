@@ -107,7 +107,7 @@ def test_products_of_sparse_rows_are_those_of_the_whitened_rows_summed_stretch_b
     assert np.linalg.eigvalsh(found)[0] > -1e-9 * found.max()
 
 
-@pytest.mark.parametrize("seconds", [50, 190])  # one stretch, and four
+@pytest.mark.parametrize("seconds", [50, 190])  # whole, and in fourteen stretches
 def test_products_and_squares_are_those_of_the_dense_likelihood_of_noise_with_that_spectrum(seconds: int) -> None:
     """Whittle's likelihood beside the one that it approximates: noise whose spectrum is that of the whitener, and a
     thousand times as much outside of all bands; its covariance matrix is solved by N. Levinson's recursion. However
