@@ -46,6 +46,7 @@ from logger.vehicle.uncertain import NumberErrors, cars_off
 from logger.vehicle.vehicle import Vehicle
 
 from ..support.drives.measured import Road, iso_road, measured_like_road, recorder_response
+from ..validation.field_loop import Windows, pooled
 from .figures import Figures
 
 Array = np.ndarray
@@ -213,34 +214,6 @@ def sensed(felt: Array, name: str, said: dict[str, float]) -> Array:
 
 
 # --- and what is made of it ------------------------------------------------------------------------------------------
-
-
-@dataclass(frozen=True)
-class Windows:
-    """Exact IRI, estimate and its standard error [m/km], arrays (n,)."""
-
-    exact: Array
-    estimate: Array
-    std: Array
-
-    @property
-    def r2(self) -> float:
-        """Share of the variance of the exact values that is explained."""
-        return float(1 - np.mean((self.estimate - self.exact) ** 2) / np.var(self.exact))
-
-    @property
-    def bias(self) -> float:
-        """How far the mean is off, as a share."""
-        return float(self.estimate.mean() / self.exact.mean() - 1)
-
-    def within(self, errors: float) -> float:
-        """Share of the windows that lie within so many standard errors."""
-        return float(np.mean(np.abs(self.estimate - self.exact) <= errors * self.std))
-
-
-def pooled(parts: Sequence[Windows]) -> Windows:
-    """The windows of several drives as one."""
-    return Windows(*(np.concatenate([getattr(one, name) for one in parts]) for name in ("exact", "estimate", "std")))
 
 
 @dataclass(frozen=True, eq=False)

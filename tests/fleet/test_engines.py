@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from logger.api.fleet import fleet_summarise
-from logger.commands.main import main
 from logger.errors import BadInput
 
-from ..support.drives.fleet_town import drives, town, write_logs
+from ..support.drives.fleet_town import drives, ingested, town
 
 NO_SPARK = "needs the 'spark' extra and Java 17, and one of them is not here"
 HAS_SPARK = importlib.util.find_spec("pyspark") is not None and shutil.which("java") is not None
@@ -21,11 +20,7 @@ HAS_SPARK = importlib.util.find_spec("pyspark") is not None and shutil.which("ja
 
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("town")
-    write_logs(drives(town(6, 400.0, 4, seed=3), 60, seed=4), folder / "logs")
-    for car in sorted((folder / "logs").iterdir()):
-        assert main(["fleet", "ingest", str(car), "--to", str(folder / "town"), "--car", car.name]) == 0
-    return folder / "town"
+    return ingested(drives(town(6, 400.0, 4, seed=3), 60, seed=4), tmp_path_factory.mktemp("town"))
 
 
 @pytest.mark.slow

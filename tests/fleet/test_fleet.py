@@ -18,7 +18,7 @@ from logger.errors import BadInput
 from logger.fleet import summary
 from logger.fleet.dataset import Dataset
 
-from ..support.drives.fleet_town import drives, town, write_logs
+from ..support.drives.fleet_town import drives, ingest, town, write_logs
 from ..support.slow import slow
 
 
@@ -27,11 +27,6 @@ def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("town")
     write_logs(drives(town(4, 200.0, 3), 24), folder)
     return folder
-
-
-def ingest(folder: Path, dataset: Path, *options: str) -> None:
-    for car in sorted(folder.iterdir()):
-        assert main(["fleet", "ingest", str(car), "--to", str(dataset), "--car", car.name, *options]) == 0
 
 
 def rows_of(dataset: Path) -> list[tuple[int, ...]]:

@@ -13,16 +13,12 @@ from logger.commands.main import main
 from logger.errors import BadInput
 
 from ..support.browser import CHROMIUM, NO_BROWSER, browser, opened
-from ..support.drives.fleet_town import drives, town, write_logs
+from ..support.drives.fleet_town import drives, ingested, town
 
 
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    folder = tmp_path_factory.mktemp("town")
-    write_logs(drives(town(8, 600.0, 4, seed=3), 120, seed=4), folder / "logs")
-    for car in sorted((folder / "logs").iterdir()):
-        assert main(["fleet", "ingest", str(car), "--to", str(folder / "town"), "--car", car.name]) == 0
-    return folder / "town"
+    return ingested(drives(town(8, 600.0, 4, seed=3), 120, seed=4), tmp_path_factory.mktemp("town"))
 
 
 @pytest.fixture(scope="module")

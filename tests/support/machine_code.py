@@ -16,16 +16,11 @@ from logger.vehicle.effect import chosen
 from logger.vehicle.simulate import Passage
 
 
-def step_a_car(effect: str = "dry_friction") -> None:
+def step_a_car() -> None:
     """A tenth of a second of the program's car, with an effect that needs the loop."""
-    added = shipped_effects()[effect]
+    added = shipped_effects()["hysteresis"]
     made = compose(read_vehicle(vehicle_file("rav4-2009")), [chosen(added, added.usual)])
     recorded(made, Passage(Track(0.1, np.zeros(200)), 100.0, made.driven(5.0 + 0.1 * np.arange(10))))
-
-
-def step_a_car_with_a_law() -> None:
-    """The same loop is compiled once more for laws by all that moves."""
-    step_a_car("hysteresis")
 
 
 def step_the_other_car() -> None:
@@ -37,7 +32,7 @@ def step_the_other_car() -> None:
     clean_acceleration(Scene(simulator_car(), (drive,)), drive)
 
 
-LOOPS = (step_a_car_with_a_law, step_the_other_car, step_a_car)
+LOOPS = (step_a_car, step_the_other_car)
 
 
 def make(folder: Path, worker: int) -> None:

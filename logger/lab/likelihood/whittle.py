@@ -50,8 +50,8 @@ _EDGES_HZ = (LOWEST_HZ, 1.0, 1.6, 2.4, 3.4, 4.6, 6.0, 7.5, 9.0, 10.5, 12.0, 13.5
 # Stretches in which a long run is whitened for the products of its columns; there a whitened sample is made of those of
 # a block before and after it. Measured beside the dense Gaussian likelihood (120 s of a car with and without friction),
 # whole or in stretches of 20 to 60 s: standard errors are right within 0.1 %, the log of the determinant within 0.005.
-# Squares of what the ends of a record cut off are 3 to 40 % too large, but hold next to nothing. Shorter ones take less
-# time, until what they share at their ends takes more; a run of the other length takes as long whole.
+# Squares of what the ends of a record cut off are 3 to 40 % too large, but hold next to nothing. The shorter a stretch,
+# the less time it takes, down to some 15 s, where the ends take more (measured).
 _WHOLE_S, _STRETCH_S = 60.0, 20.0
 # Shares of the rate between which neither a car nor the recorder's filter leaves anything (``simulate.recorder_gain``).
 _NOISE_BAND_OF_RATE = (0.465, 0.5)
@@ -212,7 +212,7 @@ class Whitener:
         rows."""
         found, rate = np.zeros((rows.shape[0], rows.shape[0])), self._bands.rate_hz
         length, reach = round(_STRETCH_S * rate), round(BLOCK_S * rate)
-        if self._count <= round(_WHOLE_S * rate) or self._bands.one_level:  # on a rig rows are few, and as long as the record
+        if self._count <= _WHOLE_S * rate or self._bands.one_level:  # on a rig rows are few, and as long as the record
             white = self(rows.toarray())
             return white @ white.T
         stretch = copy(self._bands)

@@ -3,6 +3,7 @@ algebra."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -66,6 +67,23 @@ def run_of(effects: list[Chosen], speed_mps: float, length_m: float, seed: int, 
     return Run(f"run{seed}", RATE_HZ, clean + noise, distance_m[500:], np.full(len(clean), speed_mps), FLAT)
 
 
+def crossed(run: Run) -> Callable[[Array], Array]:
+    """Readings by gains, of the car on its way over the true road."""
+    drive, structure = RoadDrive(RATE_HZ, run.measured_mps2, run.distance_m), compose(CAR).structure
+    behind_m = np.unique(structure.behind_m)
+    grid = grid_under([drive], behind_m, SPACING_M, 0.0)
+    crossing = Crossing(drive, grid, behind_m, structure.contact_patch_m)
+    place = grid.start_m + SPACING_M * np.arange(grid.count)
+    elevation = np.interp(place, LONG.start_m + SPACING_M * np.arange(len(LONG.elevation_m)), LONG.elevation_m)
+    under = crossing.under_axles(elevation[None], np.ones(len(grid.wave_number_cpm), complex))
+
+    def predicted(gains: Array) -> Array:
+        table = Tabulated(behind_m, structure.contact_patch_m, RATE_HZ, gains, np.empty((0, *gains.shape), complex))
+        return crossing.readings(under, table.responses(np.zeros(0), crossing.f_hz)[0])[0]
+
+    return predicted
+
+
 @pytest.mark.parametrize("effect", [
     named("tire_damping", tire_damping_n_s_per_m=600.0), named("top_mount_compliance", mount_stiffness_n_per_m=5e4),
     named("occupant", mass_kg=90.0, frequency_hz=4.0, damping_ratio=0.25), named("time_offset", delay_s=0.05),
@@ -73,18 +91,8 @@ def run_of(effects: list[Chosen], speed_mps: float, length_m: float, seed: int, 
 ], ids=lambda one: one.effect.name)
 def test_responses_are_those_of_the_simulation(effect: Chosen) -> None:
     run = run_of([effect], 14.0, 80.0, 1)
-    drive = RoadDrive(RATE_HZ, run.measured_mps2, run.distance_m)
-    structure = compose(CAR).structure
-    behind_m = np.unique(structure.behind_m)
-    grid = grid_under([drive], behind_m, SPACING_M, 0.0)
-    crossing = Crossing(drive, grid, behind_m, structure.contact_patch_m)
-    place = grid.start_m + SPACING_M * np.arange(grid.count)
-    elevation = np.interp(place, LONG.start_m + SPACING_M * np.arange(len(LONG.elevation_m)), LONG.elevation_m)
-    gains = response_of(compose(CAR, [effect]), RATE_HZ)
-    table = Tabulated(behind_m, structure.contact_patch_m, RATE_HZ, gains, np.empty((0, *gains.shape), complex))
-    response = table.responses(np.zeros(0), crossing.f_hz)[0]
-    waves = np.ones(len(grid.wave_number_cpm), complex)
-    reported = crossing.readings(crossing.under_axles(elevation[None], waves), response)[0]
+    predicted = crossed(run)
+    reported = predicted(response_of(compose(CAR, [effect]), RATE_HZ))
     read = run.measured_mps2 - run.measured_mps2.mean()
     assert np.mean((reported - read) ** 2) < 1.1 * NOISE_MPS2**2 + 0.02**2 * np.mean(read**2)
 
@@ -108,22 +116,13 @@ def test_a_linear_car_stands_in_for_one_that_bends_its_laws(effect: Chosen) -> N
     """Most of what such an effect does to a record of the stepping simulation is in proportion to the road, and not to
     one that moves the car less."""
     run = run_of([effect], 14.0, 200.0, 1)
-    drive = RoadDrive(RATE_HZ, run.measured_mps2, run.distance_m)
-    structure = compose(CAR).structure
-    behind_m = np.unique(structure.behind_m)
-    grid = grid_under([drive], behind_m, SPACING_M, 0.0)
-    crossing = Crossing(drive, grid, behind_m, structure.contact_patch_m)
-    place = grid.start_m + SPACING_M * np.arange(grid.count)
-    elevation = np.interp(place, LONG.start_m + SPACING_M * np.arange(len(LONG.elevation_m)), LONG.elevation_m)
-    waves = np.ones(len(grid.wave_number_cpm), complex)
+    predicted = crossed(run)
     level = float(np.log(64.0 / at_n0(2.0)))  # as LONG was generated
 
     def left(car: Car, level: float) -> float:
         (gains,) = responses_of(car, RATE_HZ, [DriveConditions(14.0, level, 2.0)])
-        table = Tabulated(behind_m, structure.contact_patch_m, RATE_HZ, gains, np.empty((0, *gains.shape), complex))
-        response = table.responses(np.zeros(0), crossing.f_hz)[0]
-        predicted = crossing.readings(crossing.under_axles(elevation[None], waves), response)[0]
-        return float(np.mean((run.measured_mps2 - run.measured_mps2.mean() - predicted) ** 2)) - NOISE_MPS2**2
+        off = run.measured_mps2 - run.measured_mps2.mean() - predicted(gains)
+        return float(np.mean(off**2)) - NOISE_MPS2**2
 
     bent = compose(CAR, [effect])
     assert not is_linear(bent)

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
+from logger.commands.main import main
 from logger.geodesy import EARTH_RADIUS_M
 from logger.records import WindowRecord
 from logger.store.log.row_format import HEADER, format_row
@@ -115,6 +116,19 @@ def write_logs(found: Drives, folder: Path, first_session: int = 1) -> None:
         log.parent.mkdir(parents=True, exist_ok=True)
         rows = [format_row(record) for record in records(found, number)]
         log.write_text("\n".join([HEADER, *rows, ""]), "ascii")
+
+
+def ingest(logs: Path, dataset: Path, *options: str) -> None:
+    """Each car's folder of logs by the command."""
+    for car in sorted(logs.iterdir()):
+        assert main(["fleet", "ingest", str(car), "--to", str(dataset), "--car", car.name, *options]) == 0
+
+
+def ingested(found: Drives, folder: Path) -> Path:
+    """The data set of these drives, in a folder beside their logs."""
+    write_logs(found, folder / "logs")
+    ingest(folder / "logs", folder / "town")
+    return folder / "town"
 
 
 def records(found: Drives, number: int) -> list[WindowRecord]:
