@@ -99,35 +99,41 @@ def refine(score: float, one: CandidateFit, worth: float = 0.0, rounds: int = 3)
     return CandidateFit.of(score, fit(one.found.linearise(), one.found.numbers, rounds, min_gain=worth))
 
 
-def reshaped(found: LinearModel | MapFit, name: str, ways: Iterable[Mapping[str, float]]) -> LinearModel:
-    """The model with other refinements of one of its effects, fitted from where it is, with the likeliest of some ways.
-    NotSimulated where none can be simulated."""
+def reshaped(found: LinearModel | MapFit, name: str, ways: Iterable[Mapping[str, float]], least: float = 0.0
+             ) -> LinearModel:
+    """The model with other refinements of one of its effects, fitted from where it is until a round gains less than
+    ``least``, with the likeliest of some ways. NotSimulated where none can be simulated."""
     state, begun = found.state, []
     for way in ways:
         effects = [replace(one, values={**one.values, **{each: way[each] for each in one.effect.refinements}})
                    if one.effect.name == name else one for one in state.effects]
         begun.append(LinearModel(found.posterior, found.posterior.state_at(
             effects, state.logs, state.record, state.size), found.numbers))
-    return fit(min(begun, key=lambda each: each.score), found.numbers)
+    return fit(min(begun, key=lambda each: each.score), found.numbers, min_gain=least)
 
 
-def with_refinements(now: Baseline, name: str) -> Baseline:
+def with_refinements(now: Baseline, name: str, least: float) -> Baseline:
     """The model, or one with refinements of one of its effects, which has its plain form, that begins there, if that
-    explains most of what the plain one leaves, and of what one that begins where it ended leaves, too."""
+    explains most of what the plain one leaves, and of what one that begins where it ended leaves, too. It is asked of
+    fits that end with a round that gains less than ``least``."""
     place = [one.effect.name for one in now.effects].index(name)
     effect = now.effects[place].effect
     plain = CandidateFit.of(now.score, now.linear)
     ways = [way for way in effect.trials() if not Chosen(effect, way).is_plain]
     try:
-        refined = CandidateFit.of(now.score, reshaped(plain.found, name, ways))
-        if refined.gain > INDISTINGUISHABLE:
-            again = CandidateFit.of(now.score, reshaped(refined.found, name, [effect.usual]))
-            plain = max(plain, again, key=lambda each: each.gain)
+        refined = CandidateFit.of(now.score, reshaped(plain.found, name, ways, least))
+        if (refined.found.state.effects[place].is_refined_too_far or not _explains_most(refined, plain)
+                or not _explains_most(refined, CandidateFit.of(now.score, reshaped(
+                    refined.found, name, [effect.usual], least)))):
+            return now
     except NotSimulated:
         return now
-    better = refined.gain > plain.gain + INDISTINGUISHABLE and refined.hold_out.explains_most_beyond(plain.hold_out)
-    taken = better and not refined.found.state.effects[place].is_refined_too_far
-    return Baseline.of(refined.found.linearise()) if taken else now
+    return Baseline.of(fit(refined.found.linearise(), refined.found.numbers))
+
+
+def _explains_most(more: CandidateFit, less: CandidateFit) -> bool:
+    """Whether one fit explains most of what another leaves."""
+    return more.gain > less.gain + INDISTINGUISHABLE and more.hold_out.explains_most_beyond(less.hold_out)
 
 
 def _rough_fit(score: float, base: Baseline, trial: Trial) -> CandidateFit:

@@ -147,8 +147,9 @@ class Likelihood(Protocol[M, P, F]):
     def with_effect(self, one: F) -> M:
         """The model with one more effect, fitted in full."""
 
-    def refined_beside(self, now: M, name: str) -> M:
-        """The model, or one with refinements of one of its effects, where they explain most of what it leaves."""
+    def refined_beside(self, now: M, name: str, least: float) -> M:
+        """The model, or one with refinements of one of its effects, where they explain most of what it leaves by fits
+        that go on until a round gains less than this."""
         return now
 
     def plain(self, now: M, name: str) -> M | None:
@@ -225,9 +226,9 @@ class MeasuredRoad:
         """The model with the effect, its runs aligned again."""
         return Baseline.of(fit(align(one.found.posterior, one.found.state), one.found.numbers))
 
-    def refined_beside(self, now: Baseline, name: str) -> Baseline:
+    def refined_beside(self, now: Baseline, name: str, least: float) -> Baseline:
         """Begun where the model ended."""
-        return with_refinements(now, name)
+        return with_refinements(now, name, least)
 
     def plain(self, now: Baseline, name: str) -> Baseline | None:
         """Begun where the model ended."""
@@ -418,7 +419,7 @@ class Search(Generic[M, P, F]):
         """The model with refinements of the effects that were found, each where it explains most of what is left."""
         for one in now.effects[self.present:] if now.explanation else ():
             if one.effect.refinements and one.is_plain:
-                now = self.likelihood.refined_beside(now, one.effect.name)
+                now = self.likelihood.refined_beside(now, one.effect.name, self.effort.round_share * now.explanation)
         return now
 
     def _in_range(self, now: M) -> M:

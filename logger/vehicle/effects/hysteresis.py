@@ -7,7 +7,8 @@ stiffness F / y, and n the sharpness of the yield,
 
 which is the law of Bouc and Wen with A = 1, beta = r / 2 and gamma = 1 - beta: where it is let go its stiffness is r
 times its first one, and after a long way it is Coulomb friction. In its plain form n and r are 1; with r = 2 it is the
-law of Dahl. Without a yield travel it is ``dry_friction`` from the beginning.
+law of Dahl. Without a yield travel it is ``dry_friction`` from the beginning: seals and bearings yield within
+hundredths of a millimetre (B. Armstrong-Helouvry and others, Automatica 30, 1994).
 
 A search tries it first of a part alone on its bench, as rubber does that; of a car, where it makes a search half as
 long again, when all others leave something unexplained.
@@ -20,10 +21,13 @@ import numpy as np
 from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Sought, Values
 from logger.vehicle.laws import Between, CornerLaws, Seen
 
+MOST = 10.0
+"""A memory gets far beyond 1 only by a step that is too long for a sharp yield over a short travel (a judgement)."""
+
 
 def force(p: Any, seen: Seen) -> Any:
     """In the suspension [N]."""
-    return p.yield_force_n * seen.memory[0]
+    return p.yield_force_n * np.minimum(np.maximum(seen.memory[0], -MOST), MOST)
 
 
 def rates(p: Any, seen: Seen) -> tuple[Any]:
@@ -39,7 +43,7 @@ class Hysteresis(ForceEffect):
     parameters = (
         Parameter("yield_force_n", 100.0, 0.0, 5000.0, 0.0, Scale.LINEAR, (30.0, 150.0),
                   "at which it slides"),
-        Parameter("yield_travel_m", 0.002, 0.0001, 0.05, None, Scale.LOG, (0.0005, 0.004),
+        Parameter("yield_travel_m", 0.002, 1e-5, 0.05, None, Scale.LOG, (0.0005, 0.004),
                   "over which the initial stiffness would reach that force"),
         Parameter("sharpness_ratio", 1.0, 0.2, 10.0, None, Scale.LOG, (0.5, 2.0),
                   "exponent: the higher, the sharper the yield", default=1.0),

@@ -90,7 +90,7 @@ class MadeUp:
     def with_effect(self, one: Tried) -> Made:
         return one.model
 
-    def refined_beside(self, now: Made, name: str) -> Made:
+    def refined_beside(self, now: Made, name: str, least: float) -> Made:
         if len(now.effects) < self.refined_from:
             return now
         by_name = {one.effect.name: one for one in now.effects}

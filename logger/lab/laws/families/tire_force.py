@@ -5,6 +5,8 @@ let go.
 """
 
 from logger.lab.laws.curves import DEFLECTION, CurveFamily
+from logger.lab.laws.draft import Draft, LawContext
+from logger.vehicle.vehicle import OWN_NAMES
 
 
 class TireForce(CurveFamily):
@@ -17,6 +19,9 @@ class TireForce(CurveFamily):
     source = "H. B. Pacejka, Tire and Vehicle Dynamics (2012), chapter 9: stiffness grows with the load"
     signature = "wheels hop at a different frequency where the road is rough"
     ends = ((0, "where it is pressed most"), (-1, "where it is let go"))
+
+    def drafts(self, context: LawContext) -> list[Draft]:
+        return [] if context.vehicle.model in OWN_NAMES else super().drafts(context)  # these have no tire
 
 
 FAMILY = TireForce()
