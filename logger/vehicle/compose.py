@@ -32,11 +32,11 @@ from logger.vehicle.models import structure_of
 from logger.vehicle.simulate import Passage
 from logger.vehicle.stepping import Motion, Stepper, begun, force_input
 from logger.vehicle.structure import (
+    CARRIED,
     Forces,
     Output,
     Structure,
     body_point,
-    carried,
     driven_outputs,
     over_ground,
     pushed,
@@ -250,7 +250,8 @@ def fine_outputs(car: Car, passage: Passage, outputs: Sequence[Output]) -> Array
         inputs = passage.smooth_inputs(structure)
         matrices = np.stack([structure.stiffness, structure.damping, structure.mass])[:, 0, 0]
         force_n = inputs @ matrices + moved(car, passage).forces[:, 0]
-        force_n += _friction_of_held(car.laws[0], inputs[:, 1], inputs[:, 2], passage.step_s)
+        if car.laws[0].dry_friction_n > 0:
+            force_n += _friction_of_held(car.laws[0], inputs[:, 1], inputs[:, 2], passage.step_s)
         return np.tile(force_n, (len(outputs), 1))  # the one thing that is measured of it
     if car.bends_laws:
         return _of_motion(structure, moved(car, passage), passage.smooth_inputs(structure), outputs)
@@ -315,7 +316,7 @@ def _linear_step(structure: Structure, step_s: float) -> tuple[Array, Array]:
 def stepper_of(car: Car, step_s: float, forces: Forces = ()) -> Stepper:
     """What steps a car, which passes all of its runs one after the other or at once, under forces on these parts."""
     if car.structure.held:
-        return Stepper.of(carried(car.structure), [replace(one, dry_friction_n=0.0) for one in car.laws], step_s)
+        return Stepper.of(CARRIED, [replace(one, dry_friction_n=0.0) for one in car.laws], step_s)
     return Stepper.of(pushed(car.structure, forces), car.laws, step_s)
 
 

@@ -205,15 +205,20 @@ def _asked(structure: Structure, laws: Sequence[CornerLaws], way: Way, begins: A
             whole.append([*addresses_of(one), i, one.between.value, len(numbers), len(one.memory)])
             numbers += numbers_in_order(one)
             memories.append([*one.memory, *[0.0] * (MOST_MEMORY - len(one.memory))])
-    places, clock = np.empty((len(way.time_s), len(structure.behind_m))), np.empty((len(way.time_s), 3))
-    if whole:
-        places[:] = way.distance_m[:, None] - structure.behind_m
-        clock.T[:] = way.time_s, np.gradient(way.distance_m, way.time_s), np.full(len(way.time_s), way.run)
+    w = len(structure.behind_m)
+    places, clock = _places(way, structure) if whole else (np.empty((len(way.time_s), one)) for one in (w, 3))
     law, states = np.array(whole, dtype=np.int64).reshape(-1, 6), np.array(memories, float).reshape(-1, MOST_MEMORY)
     own = np.arange(MOST_MEMORY) < law[:, -1:]
     states[own] = begun(states[own], begins)
     return (law, np.array(numbers, float), np.zeros((len(whole), FELT)), states, np.zeros(FELT),
             np.zeros(FELT + MOST_MEMORY), np.zeros(ANSWERS), places, clock)
+
+
+@lru_cache(maxsize=16)
+def _places(way: Way, structure: Structure) -> tuple[Array, Array]:
+    """Where the wheels stand (M, w), and time, speed and number of the run (M, 3)."""
+    clock = way.time_s, np.gradient(way.distance_m, way.time_s), np.full(len(way.time_s), way.run)
+    return way.distance_m[:, None] - structure.behind_m, np.stack(clock, axis=1)
 
 
 def _tabulated(structure: Structure, laws: Sequence[CornerLaws], step_s: float) -> tuple[Array, Array, Array]:

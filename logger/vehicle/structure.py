@@ -286,10 +286,8 @@ def mass_on_base(mass_kg: float, stiffness_n_per_m: float, damping_n_s_per_m: fl
 _MOUNTAIN_KG = 1e15
 
 
-def carried(structure: Structure) -> Structure:
-    """What moves as the bench of a part moves it, whatever the part's forces are: so heavy that they do not matter."""
-    return replace(structure, mass=np.full((1, 1), _MOUNTAIN_KG), stiffness=np.zeros((1, 1)), damping=np.zeros((1, 1)),
-                   road=np.array([[0.0, 0.0, _MOUNTAIN_KG]]))
+CARRIED = replace(mass_on_base(_MOUNTAIN_KG, 0.0, 0.0), road=np.array([[0.0, 0.0, _MOUNTAIN_KG]]), held=True)
+"""What moves as the bench of a part moves it, whatever the part's forces are: so heavy that they do not matter."""
 
 
 GROUND = "ground"
