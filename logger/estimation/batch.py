@@ -107,8 +107,7 @@ def monotonic_distance(distance_m: Array, speed_mps: Array, rate_hz: float) -> A
     half = round(_SMOOTHED_S * rate_hz / 2)
     about = np.full(2 * half + 1, 1 / (2 * half + 1))
     mean = np.convolve(np.pad(distance_m - driven, half, mode="edge"), about, mode="valid")
-    laid: Array = np.maximum.accumulate(driven + mean)
-    return laid
+    return np.asarray(np.maximum.accumulate(driven + mean))
 
 
 def estimated(
@@ -430,19 +429,14 @@ def assess(
     road_effects = tuple(one.effect.name for one in effects if isinstance(one.effect, RoadEffect))
     if track is not None:
         track = track.as_it_is(composed.structure.surface, ())
-        exact = exact_iri(windows.edges_m, _driven(track, vehicle), track.spacing_m, track.start_m)
+        # Of two tracks their mean for a full car, else the left one.
+        tracks_m = track.elevation_m.reshape(len(track.elevation_m), -1)[:, :2 if vehicle.model == "full_car" else 1]
+        exact = exact_iri(windows.edges_m, tracks_m.mean(axis=1), track.spacing_m, track.start_m)
     limits = ErrorBound(car, gridded, window_m)
     level = local_level(np.where(np.isfinite(exact), exact, windows.iri_m_per_km), window_m)
     return Assessment(vehicle, drive, sensor, window_m, windows, exact, track is not None,
                       least_errors(limits, windows.speed_mps, level), limits, road, noise, learns_noise,
                       road_effects if track is not None else ())
-
-
-def _driven(track: Track, vehicle: Vehicle) -> Array:
-    """The elevations that the sensor is compared with: of two tracks their mean for a full car, else the left one."""
-    if track.elevation_m.ndim == 1:
-        return track.elevation_m
-    return track.elevation_m.mean(axis=1) if vehicle.model == "full_car" else track.elevation_m[:, 0]
 
 
 def speed_classes(windows: Windows) -> Iterator[tuple[float, Bools]]:

@@ -36,7 +36,7 @@ class CarResponse:
     def __init__(self, car: LinearCar, off: Sequence[LinearCar] = (), is_measured: bool = True) -> None:
         self._car = car
         self.is_measured = is_measured
-        self._off = tuple(off)
+        self.off = tuple(off)
         self._powers: dict[int, Array] = {}
         self._apart: tuple[float, Array] | None = None
         self._changes: dict[int, Complex] = {}
@@ -72,18 +72,13 @@ class CarResponse:
             self._powers[key] = np.abs(self._car.response(f_hz, speed_mps)) ** 2 * (f_hz <= HIGHEST_HZ)
         return self._powers[key]
 
-    @property
-    def is_exact(self) -> bool:
-        """Whether nothing is known of how far its numbers may be off."""
-        return not self._off
-
     def changes(self, speed_mps: float) -> Complex:
         """What the gain from road to reading, at ``WAVE_NUMBERS_CPM``, changes by for each of the cars that it may be
         instead, as a share of its own (o, n). Where the gain is nothing that may be any number; speeds as ``power``."""
         key = round(log(speed_mps) * SPEEDS_PER_E)
         if key not in self._changes:
             speed_mps = exp(key / SPEEDS_PER_E)
-            own, *others = (one.response(WAVE_NUMBERS_CPM * speed_mps, speed_mps) for one in (self._car, *self._off))
+            own, *others = (one.response(WAVE_NUMBERS_CPM * speed_mps, speed_mps) for one in (self._car, *self.off))
             self._changes[key] = np.array([other / own - 1 for other in others]).reshape(-1, len(own))
         return self._changes[key]
 
@@ -115,8 +110,7 @@ class SteadyMotion:
     def _resolved(self, variance: Array | float) -> Array:
         """Share S / (S + N) of each frequency, (..., b) for variances (...), up to the last that has any motion."""
         noise = np.asarray(2 * variance / self.rate_hz)[..., None]
-        share: Array = self._moved / (self._moved + noise)
-        return share
+        return np.asarray(self._moved / (self._moved + noise))
 
     @cached_property
     def _moved(self) -> Array:

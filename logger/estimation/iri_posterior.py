@@ -58,7 +58,7 @@ def vehicle_error_variance(
     weight = _SLOPE_POWER * road
     off = vehicle_error**2 * car.power_apart(speed_mps)
     density = float((off * road) @ weight / weight.sum())
-    if not car.is_exact and car.is_measured:
+    if car.off and car.is_measured:
         gain = car.power(speed_mps) + off
         seen = gain > 0
         turned = _SLOPE_POWER[seen] / gain[seen]
@@ -109,7 +109,7 @@ def slope_knowledge(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, 
 def _vehicle_std(car: CarResponse, speed_mps: float, weight: Array) -> float:
     """A gain that is off by a share dH / H makes the wave that is found off by as much, as far as the readings tell
     it; the road's level is learned from those waves, so that what they do not tell goes with them."""
-    if car.is_exact:
+    if not car.off:
         return 0.0
     return float(np.linalg.norm(car.changes(speed_mps).real @ weight)) / float(weight.sum())
 
@@ -190,8 +190,7 @@ def _memory(spacing_m: float) -> Array:
     per_slope = np.zeros(len(wave_number_cpm), dtype=np.complex128)
     per_slope[1:] = golden_car_slope(wave_number_cpm[1:]) / (2j * pi * wave_number_cpm[1:])
     power = np.fft.irfft(per_slope, count)[: count // 2] ** 2
-    memory: Array = power / power.sum()
-    return memory
+    return np.asarray(power / power.sum())
 
 
 @lru_cache(maxsize=32)

@@ -18,11 +18,7 @@ _LEAST_NARROWING = 1e-6
 
 def density(u: Array) -> Array:
     """Standard normal density."""
-    result = u * u
-    result *= -0.5
-    np.exp(result, out=result)
-    result /= sqrt(2 * pi)
-    return result
+    return np.asarray(np.exp(-0.5 * (u * u)) / sqrt(2 * pi))
 
 
 def _tail(u: Array) -> Array:

@@ -276,8 +276,7 @@ def _covariances(t_s: Array, strengths: Sequence[Strength], weight: Array) -> Ar
 
     def hills(hill_s: float) -> Array:
         since_h, apart_h = (hill_s**2 * (2 * x - 3 + (3 + x) * np.exp(-x)) for x in (since / hill_s, apart / hill_s))
-        made: Array = since_h[:, None] + since_h - apart_h
-        return made
+        return np.asarray(since_h[:, None] + since_h - apart_h)
 
     walks = np.minimum.outer(since, since)
     by_time = {hill_s: hills(hill_s) for hill_s in {one[3] for one in strengths}}

@@ -184,18 +184,15 @@ class FollowedRoad:
         self._other.move_on(fresh.reading_mps2.size)
         if self._gaussian is None:
             return
-        guess = self._expected_of(fresh)
-        count = len(guess.variance)
+        # What readings say of accelerations of which no other tells yet: they go on as they were.
+        low, high = bounds(fresh.reading_mps2.ravel(), fresh.at_end.ravel(), self.sensor.step_mps2)
+        count = len(low)
+        centre = np.full(count, self._centre_mps2)
+        nothing = GaussianReadings(centre, np.full(count, np.inf))
+        guess = improved(nothing, low, high, centre, self._accel_variance, self._noise_variance)
         self._response.move_on(count)
         self._gaussian = GaussianReadings(np.concatenate([self._gaussian.value_mps2[count:], guess.value_mps2]),
                                           np.concatenate([self._gaussian.variance[count:], guess.variance]))
-
-    def _expected_of(self, fresh: RoadSamples) -> GaussianReadings:
-        """What readings say of accelerations of which no other tells yet: they go on as they were."""
-        low, high = bounds(fresh.reading_mps2.ravel(), fresh.at_end.ravel(), self.sensor.step_mps2)
-        centre = np.full(len(low), self._centre_mps2)
-        nothing = GaussianReadings(centre, np.full(len(low), np.inf))
-        return improved(nothing, low, high, centre, self._accel_variance, self._noise_variance)
 
     def parked(self, reading_mps2: Array) -> None:
         """More readings (n,) of a car that has stood for a while. All of one stand share a level: what they say of the

@@ -163,8 +163,7 @@ class Block:
 
         def weigh(row: Array) -> Array:
             """The weights, less what the drift can explain (Woodbury)."""
-            result: Array = weight * row - (inner @ (weighted @ row)) @ weighted
-            return result
+            return np.asarray(weight * row - (inner @ (weighted @ row)) @ weighted)
 
         def seen_as(waves: Complex) -> tuple[Array, Array]:
             """Innovations point by point, and the readings of the car on them."""
@@ -259,8 +258,7 @@ class Block:
         first, reach = self._front[read], np.maximum(self._advance, 1)[read]
         begins, ends = (np.bincount(at, minlength=self.count + 1)
                         for at in (first, np.minimum(first + reach, self.count)))
-        result: Array = (np.cumsum(begins - ends)[:-1] > 0).astype(np.float64)
-        return result
+        return np.asarray((np.cumsum(begins - ends)[:-1] > 0).astype(np.float64))
 
     def seen_points(self, read: Bools) -> int:
         """How many points of the distance grid the car passed while there were readings."""

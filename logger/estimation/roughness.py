@@ -310,5 +310,4 @@ def mean_resolved(gain: Array, variance: Array) -> Array:
     counts, sums = np.bincount(classes), np.bincount(classes, logs)
     counts, sums = counts[counts > 0], sums[counts > 0]
     strength = np.exp(sums / counts)[:, None] * gain
-    mean: Array = (counts / counts.sum()) @ (strength / (1 + strength))
-    return mean
+    return np.asarray((counts / counts.sum()) @ (strength / (1 + strength)))

@@ -126,7 +126,8 @@ class NoiseLearner:
                  forgotten: a noise is a constant of the sensor
     step_mps2    readings are bounds this wide [m/s2]; 0: they are not
 
-    ``log_noise`` (g,) are the noises that stretches are to be judged by: logarithms of m/s2.
+    ``log_noise`` (g,) are the noises that stretches are to be judged by: logarithms of m/s2; ``stretches`` is how many
+    have been taken.
     """
 
     def __init__(self, before: NoiseBelief, usual: NoiseBelief, step_mps2: float) -> None:
@@ -141,13 +142,8 @@ class NoiseLearner:
         self._slopes = np.zeros(len(self.log_noise))
         self._squares = np.zeros(len(self.log_noise))
         self._heard = 0.0
-        self._stretches = 0
+        self.stretches = 0
         self._mean, self._std = before.log_mean, before.log_std
-
-    @property
-    def stretches(self) -> int:
-        """How many have been taken."""
-        return self._stretches
 
     def take(self, log_evidence: Array) -> None:
         """One more stretch, which shares no reading with those before it: how probable it is for each of
@@ -157,7 +153,7 @@ class NoiseLearner:
         self._slopes = self._slopes + slopes
         self._squares = self._squares + slopes**2
         self._heard += 1
-        self._stretches += 1
+        self.stretches += 1
         at, _ = self._moments(1.0)
         self._mean, self._std = self._moments(self._excess(at))
 
@@ -190,15 +186,14 @@ class NoiseLearner:
     @property
     def belief(self) -> NoiseBelief:
         """What is believed now."""
-        if not self._stretches:
+        if not self.stretches:
             return NoiseBelief(self._mean, self._std)
         std = hypot(self._std, _MODEL_LOG_STD, _ROUGH_LOG_STD * self._step_mps2 / exp(self._mean))
         return NoiseBelief(self._mean, min(std, UNKNOWN_LOG_STD))
 
 
 def _log_density(belief: NoiseBelief, log_noise: Array) -> Array:
-    density: Array = -0.5 * ((log_noise - belief.log_mean) / belief.log_std) ** 2
-    return density
+    return np.asarray(-0.5 * ((log_noise - belief.log_mean) / belief.log_std) ** 2)
 
 
 def _cubic(at: Array, count: int) -> Array:
@@ -221,8 +216,7 @@ def interval_evidence(expected: Array, others: Array, low: Array, high: Array, l
     """
     deviation = np.sqrt(others + np.exp(2 * log_noise)[:, None])
     share = probability_between((low - expected) / deviation, (high - expected) / deviation)
-    evidence: Array = np.log(np.maximum(share, _LEAST_PROBABILITY)).sum(axis=1)
-    return evidence
+    return np.asarray(np.log(np.maximum(share, _LEAST_PROBABILITY)).sum(axis=1))
 
 
 def parked_evidence(steps: Array, counts: Array, log_noise: Array) -> Array:
@@ -240,16 +234,14 @@ def parked_evidence(steps: Array, counts: Array, log_noise: Array) -> Array:
     by_level = np.log(np.maximum(share, _LEAST_PROBABLE)) @ weights
     most = by_level.max(axis=1)
     evidence = most + np.log(np.exp(by_level - most[:, None]).mean(axis=1))
-    at_most: Array = np.maximum.accumulate(evidence[::-1])[::-1]
-    return at_most
+    return np.asarray(np.maximum.accumulate(evidence[::-1])[::-1])
 
 
 def residual_evidence(slope: float, free: float, at: float, log_noise: Array) -> Array:
     """Log evidence (g,) of residuals for noises (g,), given as logarithms of m/s2: that of ``free`` readings whose mean
     square makes it rise by ``slope`` at the log noise ``at`` (the scaled chi-squared distribution)."""
     off = log_noise - at
-    evidence: Array = -free * off - 0.5 * (free + slope) * np.exp(-2 * off)
-    return evidence
+    return np.asarray(-free * off - 0.5 * (free + slope) * np.exp(-2 * off))
 
 
 def with_noise(log_noise: float, residual_mps2: Array, weight: Array, resolved_waves: float) -> float:

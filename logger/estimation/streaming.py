@@ -6,7 +6,7 @@ the body's slow swing, still depend on a road already driven; windows longer tha
 Splitting the readings differently changes nothing.
 """
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import reduce
 from math import ceil, hypot, nan, sqrt
@@ -254,8 +254,11 @@ class RoadEstimator:
         self._heard += len(fresh)
         if not self._road.begun and self._heard < _FIRST_SAMPLES:
             return []
-        due = list(self._due(self._samples))
-        return self._estimates(self._samples, due) if due else []
+        passed_m = self._samples.distance_m[-1 - round(LAG_S * RATE_HZ)] + 1e-9
+        begun = self._next
+        while (self._next + 1) * self._piece_m <= passed_m:  # pieces that the car is far enough past
+            self._next += 1
+        return self._estimates(self._samples, range(begun, self._next)) if self._next > begun else []
 
     def _look_whether_parked(self, fresh: RoadSamples) -> None:
         """From the second hop of a stand on: in the first the car may still swing."""
@@ -266,14 +269,7 @@ class RoadEstimator:
         elif both.read.all() and not both.at_end.any():
             self._road.parked(fresh.reading_mps2[fresh.usable])
 
-    def _due(self, samples: RoadSamples) -> Iterator[int]:
-        """Numbers of the pieces that the car is far enough past."""
-        passed_m = samples.distance_m[-1 - round(LAG_S * RATE_HZ)] + 1e-9
-        while (self._next + 1) * self._piece_m <= passed_m:
-            yield self._next
-            self._next += 1
-
-    def _estimates(self, samples: RoadSamples, due: list[int]) -> list[WindowEstimate]:
+    def _estimates(self, samples: RoadSamples, due: Sequence[int]) -> list[WindowEstimate]:
         """Solve the block and take the pieces that are due."""
         block = Block(self._answers.grid, samples.distance_m, self._spacing_m, self._piece_m)
         read = samples.read & (np.arange(BLOCK_SAMPLES) >= round(ENTRY_S * RATE_HZ))
