@@ -125,7 +125,7 @@ def ways(mph: float, range_g: int, noise_mps2: float, delay_s: float, seed: int)
     exact = drive.road.iri(begin_m, begin_m + WINDOW_M)
     known = np.isfinite(estimate)
     found = {"exact": Found(exact[known], estimate[known], std[known], exact[known])}
-    told = f"gps: {{latency_s: {delay_s}}}\n"
+    told = f"vehicle: rav4-2009\ngps: {{latency_s: {delay_s}}}\n"  # settings that are given stand for the header's
     noise = f"accelerometer: {{noise_mps2: {noise_mps2}}}\n"
     for name, wanders, settings in (("right places", False, noise + told), ("delay known", True, told),
                                     ("default", True, "")):
