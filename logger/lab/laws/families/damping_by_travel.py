@@ -46,12 +46,11 @@ def force_n(p, travel_m, rate_mps):
         return self.draft(parameters, "def laws(self, p, laws):\n    return laws.with_force("
                           "lambda travel_m, rate_mps: more(p, travel_m) * laws.damper(rate_mps))",
                           through_points("more", names), variant=f"curve through {len(places) + 1} points", at="loop",
-                          reference=places[-1])
+                          reference=places[-1], places=tuple(places))
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
-        if draft.variant:
-            ends = (f"{say(one.name)} more at {one.meaning.split(' at ')[1].split(' over ')[0]}"
-                    for one in (draft.parameters[0], draft.parameters[len(draft.strengths) - 1]))
+        if draft.places:
+            ends = (f"{say(draft.strengths[end])} more at {1000 * draft.places[end]:g} mm" for end in (0, -1))
             return f"damping that follows a curve of the travel: over that at rest {' and '.join(ends)}"
         return (f"damping that grows with the travel to the power {say('power_ratio')}: "
                 f"{say('force_n')} at {draft.parameters[0].meaning.removeprefix('at ')}")
