@@ -15,6 +15,7 @@ integrators, Acta Numerica 19, 2010, 2.3).
 """
 
 import math
+import sys
 from collections import namedtuple
 from collections.abc import Callable
 from contextlib import suppress
@@ -36,6 +37,7 @@ try:
     from numba.core.caching import FunctionCache, IndexDataCacheFile
     from numba.core.ccallback import CFunc
     from numba.core.compiler_lock import global_compiler_lock
+    from numba.core.utils import _dynamic_modname, _dynamic_module
 except ImportError:
     COMPILED = False
 else:
@@ -161,6 +163,9 @@ def all_said(function: FunctionType) -> str | None:
 
 
 if COMPILED:
+    # Where Numba looks, when it reads machine code, for the module of a law that is in none, as a learned one.
+    sys.modules.setdefault(_dynamic_modname, _dynamic_module)
+
     class _LawCache(FunctionCache):
         """Keeps machine code in a file of this name, beside that of the loops and like it for this processor alone."""
 

@@ -309,22 +309,25 @@ def of_array(p, seen):
 def test_machine_code_is_kept_of_the_law_that_was_meant(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     numba = pytest.importorskip("numba")
     from numba.core.bytecode import FunctionIdentity
+    from numba.core.environment import Environment
 
     monkeypatch.setattr(numba.config, "CACHE_DIR", str(tmp_path))
-    names = set()
+    names, written = set(), {"__name__": "in_no_file"}
+    exec("def law(p, seen):\n    return 4.0 * p.a * seen.rate_mps", written)
 
     def answer(law, number: str = "a") -> tuple[float, int]:
         """Of a process that asks this law first, and whether its code was there."""
         monkeypatch.setattr(FunctionIdentity, "_unique_ids", count(10**6))
+        monkeypatch.setattr(Environment, "_memo", {})
         made = stepping_loop._machine_code(law, namedtuple("numbers", number), 0)
         names.add(made.native_name)
         answers = np.zeros(stepping_loop.ANSWERS)
         stepping_loop.ask(made.address, np.array([10.0]), 0, np.linspace(0, 1, stepping_loop.FELT), answers)
         return round(answers[0] * (stepping_loop.FELT - 1), 9), made.cache_hits
 
-    assert [answer(law) for law in (doubled, thrice, shared) * 2] == [
-        (20.0, 0), (30.0, 0), (15.0, 0), (20.0, 1), (30.0, 1), (15.0, 1)]
-    assert len(names) == 3
+    assert [answer(law) for law in (doubled, thrice, shared, written["law"]) * 2] == [
+        (20.0, 0), (30.0, 0), (15.0, 0), (40.0, 0), (20.0, 1), (30.0, 1), (15.0, 1), (40.0, 1)]
+    assert len(names) == 4
     monkeypatch.setitem(globals(), "SHARE", 2.5)
     assert answer(shared) == (25.0, 0)
     assert [answer(of_array) for _ in range(2)] == [(20.0, 0)] * 2  # what it holds is not said by its text
