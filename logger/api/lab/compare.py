@@ -31,7 +31,6 @@ from logger.printable import counted
 from logger.question import function
 from logger.report import document as doc
 from logger.report.blocks import SHOWN_ROWS, Block, Blocks, Bullets, Detail, Hint, Linked, Section, Table, page
-from logger.report.charts import chart
 from logger.report.quantities import chance, finite, fixed, known, numbers_of, signal_errors, some, unit_of
 from logger.runs import Run, are_on_rig, normalised_rms_error, runs_left_out, short_names
 from logger.store.formats import vehicle_file
@@ -85,7 +84,7 @@ def comparison_of(found: LabComparison) -> Comparison:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class AddedEffect(CommandResult):
+class AddedEffect(lab_words.ModelByModel):
     """A model with one more effect, fitted to all runs together with the car's parameters.
 
     found               all that the lab found
@@ -93,7 +92,6 @@ class AddedEffect(CommandResult):
                         numbers by "A.number"
     error_before        of the model as it was; ``error_refitted`` of it with its numbers and the distances refitted
     error_after         of the model with the effect, refitted likewise
-    noise_floor_error   that the sensor's noise alone makes
     p_value             how often noise alone would improve the fit as much
     helps               whether that is improbable, and the error on what no fit saw does not rise
     numbers             of the car, those that the effect moved most first
@@ -107,17 +105,10 @@ class AddedEffect(CommandResult):
     error_before: float
     error_refitted: float
     error_after: float
-    noise_floor_error: float
     p_value: float
     helps: bool
     numbers: tuple[ShiftedNumber, ...]
     model: Model
-
-    def figures(self) -> list[doc.Html]:
-        """How the error fell."""
-        return [chart(lab_words.falling("NRMSE, model by model", [
-            ("file unchanged", self.error_before), ("parameters refitted", self.error_refitted),
-            (f"with {self.effect}", self.error_after)], self.noise_floor_error))]
 
     def write(self, path: Path, option: str = "--out") -> None:
         """Write the new vehicle file."""
@@ -174,9 +165,9 @@ def asked_for(text: str, bench: Bench, question: AddEffectQuestion | LabQuestion
 def addition_of(found: AddedEffects, model: Model) -> AddedEffect:
     """What the lab found, as it is shown; the model with it."""
     return AddedEffect(
-        Blocks(addition_blocks(found)), addition_json(found), found, *_as_one(found.new),
-        found.error_before, found.error_refitted, found.error_after, found.noise_floor_error, found.p_value,
-        found.helps, tuple(found.moved), model)
+        Blocks(addition_blocks(found)), addition_json(found), found.steps, found.noise_floor_error, found,
+        *_as_one(found.new), found.error_before, found.error_refitted, found.error_after, found.p_value, found.helps,
+        tuple(found.moved), model)
 
 
 _HELPS = 0.97

@@ -18,7 +18,6 @@ from logger.api.lab.checks import check_distances, check_record, driven_parts, t
 from logger.api.lab.compare import forces_section, spectra
 from logger.api.lab.question import DiagnoseQuestion
 from logger.api.shared_fields import each
-from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
 from logger.chart_data import Array, Bars, Curves, Line
 from logger.errors import BadInput
@@ -38,7 +37,6 @@ from logger.profiles.track import Track
 from logger.question import function
 from logger.report import document as doc
 from logger.report.blocks import SHOWN_ROWS, Block, Blocks, Bullets, Detail, Hint, Section, Table, page
-from logger.report.charts import chart
 from logger.report.quantities import (
     chance,
     enumerated,
@@ -80,33 +78,25 @@ class Candidate:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Diagnosis(CommandResult):
+class Diagnosis(lab_words.ModelByModel):
     """Which physical effects a model lacks.
 
     found                all that the lab found
     baseline_error       of the model as it stands; without a profile an error is rms(measured - model) / rms(measured)
                          of each drive over the road estimated from the others
-    noise_floor_error    that the sensor's noise alone makes
     candidates           best first
     verdict              names of the effects that are missing, the most certain first; empty: none
     unexplained          whether something is left that no candidate explains
-    steps                models on the way, each with its error on what no fit saw
     vehicle              its name
     """
 
     found: LabDiagnosis | UnknownRoadDiagnosis
     baseline_error: float
-    noise_floor_error: float
     candidates: tuple[Candidate, ...]
     verdict: tuple[str, ...]
     unexplained: bool
-    steps: tuple[tuple[str, float], ...]
     vehicle: str
     next_command: str
-
-    def figures(self) -> list[doc.Html]:
-        """How the error fell."""
-        return [chart(lab_words.falling("NRMSE, model by model", self.steps, self.noise_floor_error))]
 
     def as_page(self, of: str) -> doc.Html:
         """The diagnosis as one HTML document."""
@@ -140,9 +130,8 @@ def _shown(found: LabDiagnosis | UnknownRoadDiagnosis, content: Blocks, summary:
     errors = {one.effect.name: one.standard_errors for one in found.missing}
     candidates = tuple(Candidate(one.effect.name, dict(one.one.values), dict(errors.get(one.effect.name, {})),
                                  one.error, one.p_value, tuple(one.confused_with)) for one in found.candidates)
-    return Diagnosis(content, summary, found, found.baseline_error, found.noise_floor_error, candidates, found.verdict,
-                     found.unexplained, tuple((one.words, one.error) for one in found.steps), vehicle,
-                     next_command)
+    return Diagnosis(content, summary, found.steps, found.noise_floor_error, found, found.baseline_error, candidates,
+                     found.verdict, found.unexplained, vehicle, next_command)
 
 
 def _compared(bench: Bench) -> str:
@@ -495,7 +484,7 @@ def _common_json(found: LabDiagnosis | UnknownRoadDiagnosis) -> dict[str, Any]:
              "held_out_log_likelihood_gain": None if one.held_out_gain is None else one.held_out_gain / 2}
             for one in found.candidates],
         "verdict": list(found.verdict), "unexplained": found.unexplained, "residual_over_noise": 1 + found.excess,
-        "steps": [{"step": step.words, "error": step.error} for step in found.steps],
+        "steps": lab_words.steps_json(found.steps),
         "no_better_than_refitted": list(found.no_better),
         **lab_words.errors_json(found.steps, found.noise_floor_error),
     }
@@ -521,7 +510,7 @@ def diagnosis_blocks(found: LabDiagnosis, most: int | None) -> Iterator[Block]:
     yield from diagnosis_summary(found)
     yield lab_words.removed_section(found.removed, found.band)
     yield from shape_sections(found)
-    yield _steps(found)
+    yield lab_words.steps_section(found.steps, found.noise_floor_error)
     yield from car_sections(found)
     yield Section(_ONE_BY_ONE, [
         Bars("NRMSE with each effect", "NRMSE", tuple(
@@ -541,10 +530,6 @@ def _table(found: LabDiagnosis | UnknownRoadDiagnosis, most: int | None) -> Iter
     yield Table(("Effect", "NRMSE", "p-value", "Parameters"), list(table(found)), (0, 3), most, " (--json lists all)")
     if found.no_better:
         yield f"No better than the refit alone: {', '.join(found.no_better)}."
-
-
-def _steps(found: LabDiagnosis | UnknownRoadDiagnosis) -> Detail:
-    return lab_words.steps_section([(one.words, one.error) for one in found.steps], found.noise_floor_error)
 
 
 def shape_sections(found: LabDiagnosis) -> list[Section]:
@@ -653,7 +638,7 @@ def cannot_tell(found: UnknownRoadDiagnosis) -> list[str]:
 def same_road_blocks(found: UnknownRoadDiagnosis, runs: Sequence[str], most: int | None) -> Iterator[Block]:
     """What a person reads; at a terminal ``most`` so many candidates, None: all."""
     yield from same_road_summary(found)
-    yield _steps(found)
+    yield lab_words.steps_section(found.steps, found.noise_floor_error)
     yield Section(_ONE_BY_ONE, list(_table(found, most)))
     yield Table(("Run", "NRMSE before", "after"), [
         (name, f"{before:.3f}", f"{after:.3f}") for name, (before, after) in zip(runs, found.by_run, strict=True)])

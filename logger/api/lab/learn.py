@@ -9,11 +9,10 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from logger.api.lab import words as lab_words
 from logger.api.lab.bench import Bench, bench_with
 from logger.api.lab.diagnose import shape_sections
 from logger.api.lab.question import LearnQuestion
-from logger.api.lab.words import error_words, errors_json, falling, removed_json, removed_words
-from logger.api.shown import CommandResult
 from logger.chart_data import Chart, Curves
 from logger.files import write_text
 from logger.lab.laws.draft import Draft
@@ -25,7 +24,6 @@ from logger.lab.selection.holdout import JUDGED_ON, ErrorStep
 from logger.plugins import catalogue
 from logger.question import Notify, function, silent
 from logger.report.blocks import Block, Blocks, Bullets, Detail, Hint, Section, Table, page
-from logger.report.charts import chart
 from logger.report.document import Html, tiles
 from logger.report.quantities import finite, measured, numbers_of, unit_of
 from logger.store.formats import effect_file
@@ -42,7 +40,7 @@ class LearnedModel:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LearnedLaw(CommandResult):
+class LearnedLaw(lab_words.ModelByModel):
     """A law learned from the data, or why there is none.
 
     found                all that was learned
@@ -52,7 +50,6 @@ class LearnedLaw(CommandResult):
     source               text of the Python file that holds it as an own effect; empty: none
     parameters           with ``standard_errors``, by name
     error_before         of the model as it was; ``error_after`` with the law, ``error_after_unseen`` on what no fit saw
-    noise_floor_error    that the sensor's noise alone makes
     verdict              known effects that are missing, together with the law or instead of one
     """
 
@@ -66,18 +63,12 @@ class LearnedLaw(CommandResult):
     error_before: float
     error_after: float
     error_after_unseen: float
-    noise_floor_error: float
     verdict: tuple[str, ...]
     curves: tuple[Chart, ...]
-    steps: tuple[tuple[str, float], ...]
 
     def charts(self) -> Sequence[Chart]:
         """The law over the motions that the runs had."""
         return self.curves
-
-    def figures(self) -> list[Html]:
-        """How the error fell, and the law."""
-        return [chart(falling("NRMSE, model by model", self.steps, self.noise_floor_error)), *super().figures()]
 
     def write(self, path: Path | str, option: str = "--out") -> None:
         """Write the law's file (.py), or the page (.html). Without a law there is no file: ``source`` is empty."""
@@ -109,12 +100,12 @@ def learn(question: LearnQuestion) -> LearnedLaw:
     found = learned(bench, question.progress)
     summary = as_json(found.learning, found.addition, None)
     drawn = picture_of(found)
-    steps = tuple((one["step"], one["error"]) for one in summary["steps"])
     return LearnedLaw(
-        Blocks(law_blocks(found)), summary, found, bench.model.vehicle.name,
+        Blocks(law_blocks(found)), summary, _steps(found.learning, found.addition), summary["noise_floor_error"], found,
+        bench.model.vehicle.name,
         summary["family"], summary["words"], source_of(found.learning, found.addition), summary["parameters"],
         summary["standard_errors"], summary["error_before"], summary["error_after"], summary["error_after_unseen"],
-        summary["noise_floor_error"], tuple(summary["verdict"]), () if drawn is None else (drawn,), steps)
+        tuple(summary["verdict"]), () if drawn is None else (drawn,))
 
 
 def learned(bench: Bench, notify: Notify = silent) -> LearnedModel:
@@ -194,16 +185,16 @@ def law_blocks(learned: LearnedModel) -> Iterator[Block]:
     if found.law is None or addition is None:
         assert found.diagnosis is not None
         said = why_none(found)
-        yield from removed_words(found.diagnosis.removed, found.diagnosis.band)
+        yield from lab_words.removed_words(found.diagnosis.removed, found.diagnosis.band)
         yield f"{said[0].upper()}{said[1:]}."
         yield Bullets([f"{one.effect.name}: {numbers_of(one)}" for one in found.diagnosis.missing if one.values])
         yield from shape_sections(found.diagnosis)
-        yield " ".join(error_words(found.diagnosis.steps, found.diagnosis.noise_floor_error))
+        yield " ".join(lab_words.error_words(found.diagnosis.steps, found.diagnosis.noise_floor_error))
         return
     yield from sentences(found.law, addition)
     yield from law_sections(found.law, addition, picture_of(learned))
-    yield Detail("NRMSE, model by model", [
-        falling(f"NRMSE on {JUDGED_ON}", steps_of(found.law, addition), addition.noise_floor_error)])
+    yield Detail(lab_words.MODEL_BY_MODEL, [
+        lab_words.falling(f"NRMSE on {JUDGED_ON}", _steps(found, addition), addition.noise_floor_error)])
     yield Detail("The law's file", [
         "It is an effect of your own: compare, simulate, add-effect and diagnose --effect-file read it.",
         found.law.draft.source])
@@ -212,7 +203,7 @@ def law_blocks(learned: LearnedModel) -> Iterator[Block]:
 def sentences(law: Law, addition: AddedEffects) -> list[str]:
     """The law, what it brings, and what it may be instead: paragraphs."""
     said = words(law, addition)
-    lines = [*removed_words(addition.removed, addition.band), f"Learned: {said}.", _errors(addition)]
+    lines = [*lab_words.removed_words(addition.removed, addition.band), f"Learned: {said}.", _errors(addition)]
     if law.effects:
         beside = [one for one in addition.new if one.effect.name != law.draft.name]
         lines.append("Also missing: " + "; ".join(f"{one.effect.name} ({numbers_of(one)})" for one in beside)
@@ -244,7 +235,7 @@ def _nearest(nearest: Nearest | None, law: Law) -> list[str]:
 
 def _errors(addition: AddedEffects) -> str:
     steps = (*addition.steps[:-1], ErrorStep("with the law", addition.error_after))
-    return " ".join(error_words(steps, addition.noise_floor_error))
+    return " ".join(lab_words.error_words(steps, addition.noise_floor_error))
 
 
 def source_of(found: Learning, addition: AddedEffects | None) -> str:
@@ -277,8 +268,8 @@ def as_json(found: Learning, addition: AddedEffects | None, path: str | None) ->
             "verdict": list(found.verdict), "unexplained": diagnosis.unexplained,
             "refused": found.refused and {"law": found.refused.title, "why": found.refused.why},
             "nearest": _nearest_json(found.refused.known if found.refused else None),
-            "steps": [{"step": one.words, "error": one.error} for one in diagnosis.steps],
-            **removed_json(diagnosis.removed),
+            "steps": lab_words.steps_json(diagnosis.steps),
+            **lab_words.removed_json(diagnosis.removed),
         }
     one = law_learned(law, addition)
     return {
@@ -287,7 +278,7 @@ def as_json(found: Learning, addition: AddedEffects | None, path: str | None) ->
         "standard_errors": finite(one.standard_errors), "error_before": addition.error_before,
         "error_refitted": addition.error_refitted, "error_after": addition.error_after,
         "error_after_unseen": addition.error_after, "error_before_unseen": addition.error_refitted,
-        **errors_json(addition.steps, addition.noise_floor_error),
+        **lab_words.errors_json(addition.steps, addition.noise_floor_error),
         "noise_floor_error": addition.noise_floor_error,
         "verdict": [other.effect.name for other in law.effects], "unexplained": found.unexplained,
         "log_likelihood_gain": law.gain / 2,
@@ -295,8 +286,8 @@ def as_json(found: Learning, addition: AddedEffects | None, path: str | None) ->
                    "gain": law.listed / 2, "gain_with_law": law.with_law / 2},
         "nearest": _nearest_json(law.nearest),
         "confused_with": [other.name for other in law.rivals],
-        "steps": [{"step": name, "error": error} for name, error in steps_of(law, addition)],
-        **removed_json(addition.removed),
+        "steps": lab_words.steps_json(_steps(found, addition)),
+        **lab_words.removed_json(addition.removed),
         "sentences": sentences(law, addition),
     }
 
@@ -307,11 +298,12 @@ def _nearest_json(one: Nearest | None) -> dict[str, Any] | None:
         "log_likelihood_less": (one.law_gain - one.gain) / 2}
 
 
-def steps_of(law: Law, addition: AddedEffects) -> list[tuple[str, float]]:
+def _steps(found: Learning, addition: AddedEffects | None) -> tuple[ErrorStep, ...]:
     """How the error fell."""
-    return [("file unchanged", addition.error_before), ("parameters refitted", addition.error_refitted),
-            (f"with {' and '.join([*(one.effect.name for one in law.effects), law.draft.title])}",
-             addition.error_after)]
+    if found.law is None or addition is None:
+        return found.diagnosis.steps if found.diagnosis else ()
+    names = [*(one.effect.name for one in found.law.effects), found.law.draft.title]
+    return (*addition.steps[:-1], ErrorStep(f"with {' and '.join(names)}", addition.error_after))
 
 
 _BAND = "Band: one standard error either way. The curve covers the motions of the runs."

@@ -16,8 +16,8 @@ from logger.api.lab import diagnose as diagnosing
 from logger.api.lab import learn as learning
 from logger.api.lab.bench import Bench, bench_with, with_candidates
 from logger.api.lab.question import LabLoopQuestion
-from logger.api.lab.words import falling, steps_section
-from logger.api.shown import CommandResult, check_out
+from logger.api.lab.words import MODEL_BY_MODEL, ModelByModel, falling, steps_json, steps_section
+from logger.api.shown import check_out
 from logger.api.vehicles import Model, model_of, read_vehicle
 from logger.chart_data import Array, Curves, Line
 from logger.errors import BadInput
@@ -27,11 +27,10 @@ from logger.lab import compare, diagnosis
 from logger.lab.likelihood.posterior import State
 from logger.lab.residuals.breakdown import ModelResiduals, frequencies
 from logger.lab.selection.add_effect import AddedEffects, ShiftedNumber, moved_between
-from logger.lab.selection.holdout import JUDGED_ON
+from logger.lab.selection.holdout import JUDGED_ON, ErrorStep
 from logger.question import Notify, function, silent
 from logger.report import document as doc
 from logger.report.blocks import SHOWN_ROWS, Block, Blocks, Bullets, Hint, Section, Table, page, text
-from logger.report.charts import chart
 from logger.report.quantities import wrapped
 from logger.store.formats import vehicle_file as vehicle_format
 from logger.vehicle.effect import Chosen
@@ -106,7 +105,7 @@ class Story:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LabStory(CommandResult):
+class LabStory(ModelByModel):
     """What the lab's whole loop found.
 
     story                all of it, as the lab has it
@@ -117,8 +116,6 @@ class LabStory(CommandResult):
     refused              effects that were found missing and not wanted
     law                  file of the law that was learned; None: none was
     error_before         of the model as it was given; ``error_after`` of the last one, refitted
-    noise_floor_error    that the sensor's noise alone makes
-    steps                models on the way, each with its error on all samples
     page                 the file with all of it
     """
 
@@ -132,13 +129,7 @@ class LabStory(CommandResult):
     law: Path | None
     error_before: float
     error_after: float
-    noise_floor_error: float
-    steps: tuple[tuple[str, float], ...]
     page: Path
-
-    def figures(self) -> list[doc.Html]:
-        """How the error fell."""
-        return [chart(falling("NRMSE, model by model", self.steps, self.noise_floor_error))]
 
 
 @function(LabLoopQuestion)
@@ -189,13 +180,12 @@ def walk(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progress, exp
     models = Table(("Model", "Error"), [(words, f"{error:.3f}") for words, error in steps(story)])
     summary = as_json(story) | {"story": str(out / STORY)}
     return LabStory(
-        Blocks([models, *ending(story)]), summary, story,
-        model_of(model), comparing.comparison_of(story.first),
+        Blocks([models, *ending(story)]), summary, tuple(steps(story)), story.floor, story, model_of(model),
+        comparing.comparison_of(story.first),
         tuple(diagnosing.diagnosis_of(one, given) for one in story.diagnoses),
         tuple(comparing.addition_of(one.addition, read_vehicle(one.file)) for one in story.rounds),
         tuple(comparing.comparison_of(one.comparison) for one in story.rounds), story.refused,
-        Path(story.law_file) if story.law_file else None, summary["error_before"], summary["error_after"],
-        story.floor, tuple(steps(story)), out / STORY)
+        Path(story.law_file) if story.law_file else None, summary["error_before"], summary["error_after"], out / STORY)
 
 
 def go_through(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progress, explain: Explain,
@@ -308,12 +298,10 @@ def chapter(title: str, explained: str = "") -> list[str]:
     return ["", f"=== {title} ===", *([explained] if explained else []), ""]
 
 
-def steps(story: Story) -> list[tuple[str, float]]:
+def steps(story: Story) -> list[ErrorStep]:
     """Models on the way, each with its error on what no fit saw."""
-    start = story.rounds[0].addition if story.rounds else None
-    return [("file unchanged", start.error_before if start else story.first.plain.error),
-            ("parameters refitted", start.error_refitted if start else story.first.steps[-1].error),
-            *((f"with {' and '.join(one.addition.names)}", one.addition.error_after) for one in story.rounds)]
+    return [*(story.rounds[0].addition if story.rounds else story.first).steps[:2],
+            *(one.addition.steps[-1] for one in story.rounds)]
 
 
 def ending(story: Story) -> list[str]:
@@ -353,7 +341,7 @@ def as_json(story: Story) -> dict[str, Any]:
         "error_before": models[0][1], "error_after": models[-1][1], "noise_floor_error": story.floor,
         "added": story.added, "refused": list(story.refused), "left": story.not_added,
         "unexplained": story.diagnoses[-1].unexplained,
-        "steps": [{"step": words, "error": error} for words, error in models],
+        "steps": steps_json(models),
         "effects": [{"effect": one.effect.name, "parameters": dict(one.values)} for one in story.last.effects],
         "biased": [one.name for one in story.moved if one.biased],
         "vehicles": [one.file for one in story.rounds], "law": story.law_file or None,
@@ -487,7 +475,7 @@ def field_page(title: str, about: Sequence[str], ways: Curves, story: Story, bef
         ]),
         *about,
         Section("The drives", [ways, Hint("Lines: measured. Dots: the car's GPS positions, one a second.")]),
-        Section("NRMSE, model by model", [falling(f"NRMSE on {JUDGED_ON}", steps(story), story.floor),
+        Section(MODEL_BY_MODEL, [falling(f"NRMSE on {JUDGED_ON}", steps(story), story.floor),
                                           *ending(story)]),
         Section("What was missing", diagnosing.diagnosis_summary(story.diagnoses[0])),
         Section("Before and after", [residual_spectra(story)] if story.rounds else []),

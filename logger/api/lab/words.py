@@ -2,10 +2,12 @@
 frequencies were compared, and what a residual looks like; in sentences, as rows, in pictures and for a program."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from logger.api.shown import CommandResult
 from logger.chart_data import Bars, Curves, Line
 from logger.lab.likelihood.record_band import ComparedBand
 from logger.lab.likelihood.whittle import LOWEST_HZ
@@ -14,6 +16,8 @@ from logger.lab.residuals.unexplained import EXPONENTIAL, OFFSET, RAMP, STEP, WA
 from logger.lab.selection.holdout import AS_FILED, JUDGED_ON, REFITTED, ErrorStep, fit_percent, rising
 from logger.printable import percent
 from logger.report.blocks import SHOWN_ROWS, Block, Detail, Hint, Table
+from logger.report.charts import chart
+from logger.report.document import Html
 from logger.report.quantities import enumerated, some
 from logger.runs import shortened
 
@@ -188,13 +192,37 @@ def band_json(band: ComparedBand | None) -> dict[str, Any]:
     return {"pass_band_hz": [band.low_hz, band.high_hz], "low_passed_at_hz": band.cutoff_hz}
 
 
-def steps_section(steps: Sequence[tuple[str, float]], floor: float, *more: Block) -> Detail:
+MODEL_BY_MODEL = "NRMSE, model by model"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ModelByModel(CommandResult):
+    """An answer with the models on the way to it.
+
+    steps                each model with its error on what no fit saw
+    noise_floor_error    that the sensor's noise alone makes
+    """
+
+    steps: tuple[ErrorStep, ...]
+    noise_floor_error: float
+
+    def figures(self) -> list[Html]:
+        """How the error fell, and the charts."""
+        return [chart(falling(MODEL_BY_MODEL, self.steps, self.noise_floor_error)), *super().figures()]
+
+
+def steps_section(steps: Sequence[ErrorStep], floor: float, *more: Block) -> Detail:
     """The error of each step on what no fit saw, as bars and as a table."""
     rows = [(f"{number}", words, f"{error:.4f}") for number, (words, error) in enumerate(steps)]
-    return Detail("NRMSE, model by model", [falling(f"NRMSE on {JUDGED_ON}", steps, floor),
-                                            Table(("Step", "Model", "NRMSE"), rows, (0, 1)), *more])
+    return Detail(MODEL_BY_MODEL, [falling(f"NRMSE on {JUDGED_ON}", steps, floor),
+                                   Table(("Step", "Model", "NRMSE"), rows, (0, 1)), *more])
 
 
-def falling(title: str, steps: Sequence[tuple[str, float]], floor: float) -> Bars:
+def steps_json(steps: Sequence[ErrorStep]) -> list[dict[str, Any]]:
+    """The same for a program."""
+    return [{"step": words, "error": error} for words, error in steps]
+
+
+def falling(title: str, steps: Sequence[ErrorStep], floor: float) -> Bars:
     """The error of each step, beside the noise."""
     return Bars(title, "NRMSE", tuple(steps), (floor, "noise floor"))

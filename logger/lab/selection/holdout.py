@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 import numpy.typing as npt
@@ -109,8 +110,7 @@ def fit_percent(error: float) -> float:
     return 100 * (1 - error)
 
 
-@dataclass(frozen=True, eq=False)
-class ErrorStep:
+class ErrorStep(NamedTuple):
     """A model: what was done, and its error on what no fit saw."""
 
     words: str

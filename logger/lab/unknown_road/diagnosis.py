@@ -297,7 +297,7 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
     by_name = {one.effect.name: one for one in _with_errors(now.fit)}
     way = [ErrorStep(AS_FILED, as_filed), ErrorStep(REFITTED, base.hold_out.error),
            *(ErrorStep(f"with {name}", steps.get(name, now.hold_out).error) for name in names)]
-    way[-1] = replace(way[-1], error=now.hold_out.error)
+    way[-1] = way[-1]._replace(error=now.hold_out.error)
     undecided = tuple(one.chosen for one in selection.last.fits if search.may_imitate(now, one))
     candidates, no_better = candidates_of(search, selection, now.effects, partial(_best_of_screened, base))
     return UnknownRoadDiagnosis(

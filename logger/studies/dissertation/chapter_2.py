@@ -121,7 +121,7 @@ def table_2_3(effort: Workload) -> Result:
     printed_federal = (("good", 1.50), ("fair", 2.68))
     step = 0.001  # of the IRI that is asked for; half the last printed figure is 0.005
     iri = np.round(np.arange(0, 25.0, step), 3)
-    (kinds,) = ([road_kinds(one) for one in iri.tolist()] for _ in effort.each(range(1)))
+    kinds = [road_kinds(one) for one in iri.tolist()]
     lines = []
     values: list[Value] = []
     for place, (name, low, high) in enumerate(PRINTED_RANGES):

@@ -78,7 +78,7 @@ COLUMNS = ("motion", "published [Hz] .1f", "undamped, coupled [Hz] .3f", "spring
 def table_4_1(effort: Workload) -> Result:
     printed_hz = (1.2, 11.0)
     car = quarter_car(GOLDEN_CAR)
-    (rows,) = (quoted(car, ("body", "wheel"), printed_hz, (0.40, None)) for _ in effort.each(range(1)))
+    rows = quoted(car, ("body", "wheel"), printed_hz, (0.40, None))
     verdict = ("The published frequencies are those of the coupled car without its damper, to the last digit. The "
                "published damping ratio is nearly that of a body on spring and tire in series, with the damper "
                "parallel to both: 0.395, published 0.39. In the coupled car, whose wheel moves too, the damping ratio "
@@ -123,8 +123,7 @@ def table_4_2(effort: Workload) -> Result:
     printed_hz = (1.1, 11.0)
     printed_mass_kg = 875.0
     names, (bounce_hz, hop_hz) = ("body bounces", "body pitches", "wheels", "wheels"), printed_hz
-    (rows,) = (quoted(structure_of(rav4()), names, (bounce_hz, None, hop_hz, None), (0.30, None, None, None))
-               for _ in effort.each(range(1)))
+    rows = quoted(structure_of(rav4()), names, (bounce_hz, None, hop_hz, None), (0.30, None, None, None))
     curb_kg, person_kg = 1524.07, 72.57
     by_eq = (curb_kg / 1.15 + 2 * person_kg) / 2
     verdict = ("1.1 and 11 Hz are the undamped frequencies of bounce and wheels; the pitch, 1.45 Hz, is not named. "
@@ -418,8 +417,7 @@ def fig_4_19(effort: Workload) -> Result:
     windows_m = (15.0, 100.0)
     bump_at_m = 5.0
     bump_ends_m = 15.0  # both axles are over it and the body has swung out
-    (whole,) = (record_of(bump(bump_at_m), BUMP_MPS, (windows_m[-1] + 1) / BUMP_MPS,
-                          Conditions(iri_m_per_km=5.0)) for _ in effort.each(range(1)))
+    whole = record_of(bump(bump_at_m), BUMP_MPS, (windows_m[-1] + 1) / BUMP_MPS, Conditions(iri_m_per_km=5.0))
     wheelbase_m = float(np.max(structure_of(rav4()).behind_m))
     rows, pictures = [], []
     values: list[Statement] = []
@@ -640,8 +638,7 @@ def _error_percent(record: Run, height_m: float, width_m: float) -> float:
 def fig_4_30(effort: Workload) -> Result:
     step_at_m = 10.0
     still = 0.02  # of the peak: the body has swung out
-    (record,) = (record_of(bridge(step_at_m), BRIDGE_MPS, 4.0, Conditions(noise_mps2=0.0))
-                 for _ in effort.each(range(1)))
+    record = record_of(bridge(step_at_m), BRIDGE_MPS, 4.0, Conditions(noise_mps2=0.0))
     wheelbase_m = float(np.max(structure_of(rav4()).behind_m))
     accel, time_s = record.measured_mps2, np.arange(len(record.measured_mps2)) / record.rate_hz
     front_s = step_at_m / BRIDGE_MPS
@@ -756,8 +753,7 @@ def fig_4_32(effort: Workload) -> Result:
     step_at_m, length_m, seed = 50.0, 100.0, 0
     behind_m = 15.0  # both axles are over the step and the body has swung out
     conditions = Conditions(noise_mps2=0.0, iri_m_per_km=printed_iri, seed=seed)
-    (record,) = (record_of(bridge(step_at_m, -STEP_M), BRIDGE_MPS, length_m / BRIDGE_MPS, conditions)
-                 for _ in effort.each(range(1)))
+    record = record_of(bridge(step_at_m, -STEP_M), BRIDGE_MPS, length_m / BRIDGE_MPS, conditions)
     accel, distance_m = record.measured_mps2, record.distance_m
     hit = (distance_m >= step_at_m) & (distance_m < step_at_m + behind_m)
     peaks = [float(np.abs(accel[part]).max()) for part in (hit, ~hit)]

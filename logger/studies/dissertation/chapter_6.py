@@ -372,7 +372,7 @@ def fig_6_6(effort: Workload) -> Result:
             rms_calibration.loaded(rav4(), sprung_mass_factor=2.0))
     own, two, heavy = (rms_calibration.rms_relation(known_vehicle(car), None, speeds).iri_per_accel_rms for car in cars)
     settings = rms_calibration.CalibrationSettings(tuple(speeds.tolist()), roads=effort.count(120, 10))
-    (drives,) = (rms_calibration.calibrate(known_vehicle(rav4()), None, settings) for _ in effort.each(range(1)))
+    drives = rms_calibration.calibrate(known_vehicle(rav4()), None, settings)
     rows = tuple((float(mph), slope, line.iri_per_accel_rms.slope, 100 * line.window_iri_per_accel_rms.spread,
                   *map(float, others)) for mph, slope, line, *others in
                  zip(SPEEDS_MPH, own.tolist(), drives, 100 * (two / own - 1), 100 * (heavy / own - 1), strict=True))
@@ -557,7 +557,7 @@ def _compared(title: str, cut: Figures) -> Curves:
                                                      "text gives no numbers for the figures."))
 def fig_6_16(effort: Workload) -> Result:
     settings = rms_calibration.CalibrationSettings(roads=effort.count(60, 10))
-    (lines,) = (rms_calibration.calibrate(known_vehicle(rav4()), None, settings) for _ in effort.each(range(1)))
+    lines = rms_calibration.calibrate(known_vehicle(rav4()), None, settings)
     mph = np.round(np.array(rms_calibration.SPEEDS_MPS) / MPH_MPS)
     per_iri = np.array([one.a_w_per_iri.slope for one in lines])
     levels = np.array(rms_calibration.LEVELS_IRI)

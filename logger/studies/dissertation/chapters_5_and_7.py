@@ -145,7 +145,7 @@ def table_5_2(effort: Workload) -> Result:
     printed_damping_percent = 1.34
     # The table above Eq 5.3: time [s] and acceleration of peaks 1 and 11, in m/s2 as it says.
     printed_rows = ((1.19, 0.1978), (14.83, 0.8545))
-    (ps2119, phone), = (compare_sensors() for _ in effort.each(range(1)))
+    ps2119, phone = compare_sensors()
     rows = tuple((float(mode), printed, *ours) for mode, (printed, *ours) in enumerate(
         zip(PRINTED_HZ, ps2119.peaks_hz, phone.peaks_hz, strict=True), start=1))
     table = Table("Peaks of the spectrum", ("mode .0f", "published, both sensors [Hz] .3f",
@@ -208,7 +208,7 @@ def table_5_4(effort: Workload) -> Result:
     printed_stiffness = (("fixed-fixed", 3.0, False), ("fixed-free", 12.0, True))
     building = five_storey.structure()
     frequencies = five_storey.frequencies_hz(building)
-    (found,) = (_from_record(building) for _ in effort.each(range(1)))
+    found = _from_record(building)
     nothing: tuple[float | None, ...] = (None, None)
     columns = zip((*five_storey.PRINTED_MEASURED_HZ, *nothing), (*five_storey.PRINTED_MODEL_HZ, *nothing),
                   (*PRINTED_ERROR_PERCENT, *nothing), frequencies.tolist(), strict=True)
