@@ -17,9 +17,9 @@ Of no estimator are thirds that the truth chooses without bias where the reading
 the readings, lies nearer to the usual road, so the smooth third reads too rough, and of it only windows that seem rough
 enough are answered. Without bias are thirds that the estimate chooses ("chosen by it"). ``--best`` draws, on constant
 roads and sections, so many times from all roads that lead to these readings (``rounding_limit``): their mean is the
-best estimate, of the same windows; no other has a smaller error. Both thirds of the road stand beside it, and how far
-two chains lie apart (r.m.s., as a share of the deviation of the exact IRI): above some 0.2 they have not settled. Laps
-of 2.4033 km at 20 mph take it half the time of 2.4 km: their samples are quick to transform.
+best estimate, of the same windows; no other has a smaller error. Both thirds of the road, and those that it chooses,
+stand beside it, and how far two chains lie apart (r.m.s., as a share of the deviation of the exact IRI): above some 0.2
+they have not settled. Laps of 2.4033 km at 20 mph take half the time of 2.4 km: their samples are quick to transform.
 
 Roads: ``sections`` change their level at steps, 20 to 500 m apart, by factors of 2 to 16 in the spectrum; ``slow`` ones
 swell over some 200 m; ``constant`` ones do not change; ``holes`` are constant with potholes, bumps, joints and patches.
@@ -361,7 +361,7 @@ HEADING = (f"{'':42s}{'R2':>7s}{'plain':>7s}{'limit':>7s} |{'bias %':>7s}{'smoot
            f"{'chosen by it':>14s} |{'in 1':>6s}{'in 2':>6s} |"
            + "".join(f"{name + ': in 1':>13s}{'in 2':>6s} |" for name in SECTIONS)
            + f"{'a_w bias %':>11s}{'in 1':>6s}{'in 2':>6s} |{'ms/s':>6s} |{'plain: bias':>12s}{'smooth':>7s}"
-           f"{'rough':>7s} |{'best: R2':>9s}{'bias':>7s}{'smooth':>7s}{'rough':>7s}{'apart':>7s} |")
+           f"{'rough':>7s} |{'best: R2':>9s}{'bias':>7s}{'smooth':>7s}{'rough':>7s}{'by it':>14s}{'apart':>7s} |")
 
 GOALS = (f"{'goal':42s}{'>=':>7s}{'plain':>7s}{'':7s} |{'+-2':>7s}{'+-5':>7s}{'+-5':>7s}{'+-5':>7s}{'+-5':>7s} |"
          f"{'64-72':>6s}{'93-97':>6s} |"
@@ -375,10 +375,15 @@ def print_cells(name: str, cells: list[Cell]) -> None:
         for field in ("exact", "estimate", "plain", "limit", "rough_m_per_km"))
     chains = np.concatenate([cell.best for cell in cells], axis=1)
     std = np.concatenate([cell.errors.std for cell in cells])
-    judged = np.concatenate([local_level(cell.estimate, WINDOW_M) for cell in cells])
     known = np.isfinite(estimate)
-    thirds = [known & (rough <= np.quantile(rough, 1 / 3)), known & (rough >= np.quantile(rough, 2 / 3))]
-    chosen = [known & (judged <= np.nanquantile(judged, 1 / 3)), known & (judged >= np.nanquantile(judged, 2 / 3))]
+
+    def thirds(level: Array) -> list[Array]:
+        low, high = np.quantile(level[np.isfinite(level)], (1 / 3, 2 / 3)) if np.isfinite(level).any() else (nan, nan)
+        return [known & (level <= low), known & (level >= high)]
+
+    by_truth, chosen, chosen_by_best = thirds(rough), *(
+        thirds(np.concatenate([local_level(row, WINDOW_M) for row in rows]))
+        for rows in ([cell.estimate for cell in cells], [cell.best.mean(axis=0) for cell in cells]))
 
     def bias(row: Array, which: Array, true: Array = exact) -> float:
         return 100 * (float(row[which].mean() / true[which].mean()) - 1) if which.any() else np.nan
@@ -398,12 +403,12 @@ def print_cells(name: str, cells: list[Cell]) -> None:
     limit_r2 = r2(limit, exact) if np.isfinite(limit).all() else np.nan
     best, apart = chains.mean(axis=0), float(np.std(np.diff(chains, axis=0)[0, known]) / np.std(exact[known]))
     print(f"{name:42s}{r2(estimate[known], exact[known]):7.3f}{r2(by_plain, exact):7.3f}{limit_r2:7.3f}"
-          f" |{biases(estimate, known, *thirds, *chosen)}"
+          f" |{biases(estimate, known, *by_truth, *chosen)}"
           f" |{windows[0]:6.2f}{windows[1]:6.2f} |"
           + "".join(f"{one:13.2f}{two:6.2f} |" for one, two in of_sections)
           + "{:+11.1f}{:6.2f}{:6.2f} |".format(bias(a_w, felt, true), *within((a_w - true)[felt], a_w_std[felt]))
-          + f"{spent:6.2f} |     {biases(by_plain, known, *thirds)}"
-          f" |{r2(best[known], exact[known]):9.3f}{biases(best, known, *thirds)}{apart:7.2f} |"
+          + f"{spent:6.2f} |     {biases(by_plain, known, *by_truth)}"
+          f" |{r2(best[known], exact[known]):9.3f}{biases(best, known, *by_truth, *chosen_by_best)}{apart:7.2f} |"
           + (f"  {known.mean():.0%} of windows" if not known.all() else ""), flush=True)
 
 

@@ -669,10 +669,10 @@ def drives(figures: Figures, extent: Extent, sensors: Sequence[Accelerometer] = 
 def varied_exact(drive: Drive, sensor: Accelerometer, seed: int, window_m: float = WINDOW_M) -> Windows:
     """A drive of changing speed with its way known exactly; windows in which the car stood or crept are in it."""
     rng = np.random.default_rng([FIRST_SEED, seed])
-    readings, clipped = on_grid(drive, sensor, rng)
+    readings, each, clipped = on_grid(drive, sensor, rng)
     place_m = drive.place_m[:: sensor.oversample][: len(readings)]
     numbers = np.arange(int(place_m[-1] / window_m))
-    found = estimates(reported(sensor), readings, clipped, place_m, window_m)
+    found = estimates(reported(sensor), each, clipped, place_m, window_m)
     estimate, std = np.array([found.get(number, (np.nan, np.nan)) for number in numbers.tolist()]).T
     speed_mps = drive.speed_mps[:: sensor.oversample][: len(readings)]
     rms = by_rms(readings, (place_m / window_m).astype(int), speed_mps, len(numbers))
