@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-from scipy.signal import welch
 
 from logger.api.drive_questions import ComfortQuestion
 from logger.api.shown import CommandResult, Shown, checks_json, checks_lines, table
@@ -123,6 +122,8 @@ class Comfort(CommandResult):
 
     def charts(self) -> Sequence[Chart]:
         """The running r.m.s. over 1 s, beside a_w, and the spectrum of the weighted acceleration."""
+        from scipy.signal import welch  # takes a while to load
+
         time_s = np.arange(len(self.weighted_mps2)) / self.rate_hz
         running = RunningRms(self.rate_hz).process(self.weighted_mps2)
         frequency_hz, psd = welch(self.weighted_mps2, self.rate_hz,

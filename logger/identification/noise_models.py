@@ -292,6 +292,6 @@ def _lagged(inputs: Array) -> Array:
 
 
 def _test(statistic: float, degrees: int) -> Test:
-    from scipy.stats import chi2
+    from scipy.special import chdtrc
 
-    return Test(statistic, degrees, float(chi2.sf(statistic, degrees)))
+    return Test(statistic, degrees, float(chdtrc(degrees, statistic)))

@@ -48,7 +48,7 @@ class FrequencyTest(ResidualTest):
 
     def run(self, tested: ResidualEvidence) -> ResidualTestResult:
         """The share of that band."""
-        from scipy.stats import f
+        from scipy.special import fdtrc
 
         parts, residuals = tested.where.frequency, tested.residuals
         whole, span_s = parts[-1].high, sum(map(len, residuals.residual)) / residuals.rate_hz
@@ -60,7 +60,7 @@ class FrequencyTest(ResidualTest):
                 chances.append(1.0)
                 continue
             ratio = part.share / width / max((1 - part.share) / (whole - width), 1e-300)
-            chances.append(float(f.sf(ratio, max(freedom * width, 1.0), freedom * (whole - width))) * len(parts))
+            chances.append(float(fdtrc(max(freedom * width, 1.0), freedom * (whole - width), ratio)) * len(parts))
         best = max((i for i in range(len(parts)) if chances[i] < SIGNIFICANCE), key=lambda i: parts[i].share,
                    default=int(np.argmin(chances)))
         part = parts[best]

@@ -90,7 +90,7 @@ class ProportionTest(ResidualTest):
 
 def _two_gains(residuals: ModelResiduals, low_hz: float, high_hz: float) -> tuple[float, float, float, float] | None:
     """Gains on weak and on strong blocks, the p-value of their difference and its standard error; None for too few."""
-    from scipy.stats import t
+    from scipy.special import stdtr
 
     if high_hz <= low_hz:
         return None
@@ -113,7 +113,7 @@ def _two_gains(residuals: ModelResiduals, low_hz: float, high_hz: float) -> tupl
     if not 0 < error < np.inf:
         return None
     freedom = error**4 / sum(one**4 for one in errors) * (third - 1)
-    return gains[0], gains[1], float(2 * t.sf(abs(gains[1] - gains[0]) / error, freedom)), error
+    return gains[0], gains[1], float(2 * stdtr(freedom, -abs(gains[1] - gains[0]) / error)), error
 
 
 TESTS = ResidualTests("response", (CoherenceTest(), GainTest(), ProportionTest()))

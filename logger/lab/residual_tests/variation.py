@@ -46,7 +46,7 @@ class SpeedTest(ResidualTest):
 
     def run(self, tested: ResidualEvidence) -> ResidualTestResult:
         """The factor, between the 5 and 95 % quantiles of the speed."""
-        from scipy.stats import t
+        from scipy.special import stdtr
 
         residuals = tested.residuals
         speed = block_means(residuals, residuals.kept(lambda run: run.speed_mps))
@@ -63,7 +63,7 @@ class SpeedTest(ResidualTest):
         rest = residual - columns @ coefficients
         error = float(np.sqrt(rest @ rest / freedom * np.linalg.pinv(columns.T @ columns)[1, 1]))
         factor = float(np.exp(coefficients[1] / 2))
-        p_value = float(2 * t.sf(abs(coefficients[1]) / error, freedom)) if error > 0 else np.nan
+        p_value = float(2 * stdtr(freedom, -abs(coefficients[1]) / error)) if error > 0 else np.nan
         return self.result(factor, factor * error / 2, p_value, max(factor, 1 / factor) > LEAST_GROWTH,
                            slow_mps=slow, fast_mps=fast)
 
@@ -81,7 +81,7 @@ class PlaceTest(ResidualTest):
 
     def run(self, tested: ResidualEvidence) -> ResidualTestResult:
         """The residual there over the usual one."""
-        from scipy.stats import chi2
+        from scipy.special import chdtrc
 
         parts, names = tested.where.place, short_names(tested.residuals.runs)
         usual = float(np.median([part.residual_mps2 for part in parts])) if parts else 0.0
@@ -89,7 +89,7 @@ class PlaceTest(ResidualTest):
             return self.result()
         worth = 1 / (1 + 2 * float((autocorrelations(tested.residuals.residual, 2 * LAGS) ** 2).sum()))
         mean = sum(part.residual_mps2**2 * part.samples for part in parts) / sum(part.samples for part in parts)
-        chances = [float(chi2.sf(worth * part.samples * part.residual_mps2**2 / mean, worth * part.samples))
+        chances = [float(chdtrc(worth * part.samples, worth * part.samples * part.residual_mps2**2 / mean))
                    for part in parts]
         worst = tested.where.worst_places(3)
         ratio = max(part.residual_mps2 for part in worst) / usual

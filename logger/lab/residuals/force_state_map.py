@@ -115,14 +115,14 @@ class _Regression:
     def fit(self, columns: Sequence[Array]) -> tuple[Array, Array, float, float]:
         """Regression on columns (n, k) per run: coefficients (k,), their covariance (k, k), the p-value of all together
         (these by whitened residuals), and the share of the residual that they explain."""
-        from scipy.stats import f
+        from scipy.special import fdtrc
 
         coefficients, covariance, rank, freedom, power, rest = _fit(
             *(self._whitened(one) for one in (self.residual, self.nuisance, columns)))
         if rank == 0 or freedom < 1 or not rest > 0:
             return coefficients, covariance, float("nan"), 0.0
         variance = rest / freedom
-        p_value = float(f.sf((power - rest) / rank / variance, rank, freedom))
+        p_value = float(fdtrc(rank, freedom, max(power - rest, 0.0) / rank / variance))
         _, _, rank, freedom, power, rest = _fit(self.residual, self.nuisance, columns)
         share = 1 - rest / power * (freedom + rank) / freedom if power > 0 else 0.0
         return coefficients, covariance * variance, p_value, max(share, 0.0)
