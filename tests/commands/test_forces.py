@@ -672,6 +672,43 @@ def test_a_rig_that_no_force_drives_has_no_coil_that_saturates(tmp_path: Path) -
               str(tmp_path / "out.yaml"), str(run)])
 
 
+@pytest.mark.slow
+def test_rubber_that_creeps_is_no_mass_on_a_spring(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """An isolator of 1.8 t on a shaken base, whose rubber is a spring, a damper, and a spring with a damper in series;
+    its acceleration alone was measured."""
+    mass, spring, damper, creeping, creep_s = 1800.0, 9e5, 4e3, 5e5, 0.02
+    base = noise(25.0, 0.002, 11)
+    away = [[0, 1, 0], [-spring / mass, -damper / mass, -creeping / mass], [0, 1, -1 / creep_s]]  # from the base
+    measured = lsim((away, [[0], [-1], [0]], [away[1]], [[0]]), base(FINE_S, 2), FINE_S)[1][::16]
+    measured = measured + np.random.default_rng(12).normal(0.0, 0.003 * measured.std(), len(measured))
+    run = written(tmp_path / "run", {"accel_z_mps2": measured}, {"elevation_m": base(TIME_S)}, "source: me\n")
+    (tmp_path / "rig.yaml").write_text("name: isolator\nmodel: single_mass\nmass_kg: 1800 +- 2%\n"
+                                       "stiffness_n_per_m: 6e5\ndamping_n_s_per_m: 6000\n")
+    rig = str(tmp_path / "rig.yaml")
+    assert main(["diagnose", "--vehicle", rig, "--tolerance", "unknown", str(run), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["verdict"] == ["spring_with_memory"] and not found["unexplained"]
+    numbers = found["candidates"][0]["parameters"]
+    assert numbers["creep_time_s"] == pytest.approx(creep_s, rel=0.05)
+    assert numbers["creeping_stiffness_n_per_m"] == pytest.approx(creeping, rel=0.05)
+
+
+def test_a_blow_on_a_quick_rig_needs_three_of_its_periods(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """After the first 2 s, which are left out: 2.38 s for a mass that rings at 8 Hz."""
+    bench, push, did = ringing(2.0)
+    (tmp_path / "rig.yaml").write_text(bench.yaml)
+    for count, taken in ((600, True), (590, False)):
+        run = written(tmp_path / f"{count}", {"accel_z_mps2": did["accel_z_mps2"][:count]},
+                      {"force_n": push(TIME_S)[:count]}, BODY)
+        command = ["compare", "--vehicle", str(tmp_path / "rig.yaml"), str(run), "--json"]
+        if taken:
+            assert main(command) == 0
+            assert json.loads(capsys.readouterr().out)["error"] < 0.01
+        else:
+            with pytest.raises(BadInput, match=r"expected a record of 2\.38 s or longer, found 2\.36 s"):
+                main(command)
+
+
 def test_a_short_test_of_a_part_is_taken_whole(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """A bench that makes five turns a second needs no five: what moves the part is known, so it has no past."""
     whole = TIME_S <= 2.0

@@ -343,7 +343,7 @@ _LEAST_OF_PART_S = 1.0  # a damper's bench makes five turns a second
 _CLIPPED_SHARE = 0.005  # of a record: fewer are a blow or two (a judgement)
 _DIES_DOWN = 0.95  # of the r.m.s.: a damping ratio of 0.3 % does so within six periods (a judgement)
 _BY_CHANCE = 0.01  # that swings which do not shrink seem to (a judgement)
-_LEAST_PERIODS = 3.0  # of what swings freely: fewer leave its damping to chance (a judgement)
+_LEAST_PERIODS = 3.0  # of what swings: fewer leave its damping to chance (a judgement)
 # The lab looks up to 0.37 of the rate (lab/stretches.py): wheels that hop at 10 to 18 Hz are seen from 50 samples a
 # second on. A recorder's clock may be off by a per cent.
 _LEAST_RATE_HZ, _CLOCK = 50.0, 0.01
@@ -371,7 +371,7 @@ def checked_runs(drives: Sequence[Drive], thin: bool = True, vehicle: Vehicle | 
         if vehicle is not None:
             check_forces(vehicle, drive.track, str(drive.path / RUN))
             check_channels(drive, vehicle)
-    runs = [run for one in drives for run in driven_stretches(one)]
+    runs = [run for one in drives for run in driven_stretches(one, vehicle)]
     if vehicle is not None and moves_freely(vehicle):
         runs = [of_rates(run) for run in runs]
     kept = thinned_runs(runs, vehicle) if thin else runs
@@ -429,7 +429,7 @@ def check_distances(drive: Drive) -> None:
                        f"from the speed and {way_m:.4g} m from the distance ({likely_unit(by_speed_m, way_m)})")
 
 
-def driven_stretches(drive: Drive) -> list[Run]:
+def driven_stretches(drive: Drive, vehicle: Vehicle | None = None) -> list[Run]:
     """The parts of a drive in which the car moved, or it is known what drove the rig, and there were readings
     (``driven_parts``), each a run. A part says in its name which seconds it is of. BadInput as ``driven_parts``."""
     driven = None
@@ -437,7 +437,7 @@ def driven_stretches(drive: Drive) -> list[Run]:
     if isinstance(drive.track, Excitation):
         near_s, time_s = 0.5 / drive.rate_hz, drive.time_s - drive.time_s[0]
         driven = (time_s > drive.track.start_s - near_s) & (time_s < drive.track.end_s + near_s)
-    parts = driven_parts(drive, driven)
+    parts = driven_parts(drive, driven, vehicle)
     whole = len(parts) == 1 and parts[0] == slice(0, len(drive.time_s))
     cut = LeftOut((len(drive.time_s) - sum(part.stop - part.start for part in parts)) / drive.rate_hz, "s",
                   "without excitation or readings")
@@ -455,12 +455,17 @@ def driven_stretches(drive: Drive) -> list[Run]:
 
 
 def least_s(drive: Drive, vehicle: Vehicle | None = None) -> float:
-    """How long a drive, or a test of a part, has to be; of a rig that nothing drives three periods of the vehicle's
-    slowest vibration, or what there is where that is not known [s]."""
-    if past_of(drive.track) is Past.FREE:
-        slowest_hz = 0.0 if vehicle is None else float(undamped_frequencies_hz(structure_of(vehicle))[0])
-        return min(_LEAST_PERIODS / slowest_hz, LEAST_S) if slowest_hz else 0.0
-    return _LEAST_OF_PART_S if past_of(drive.track) is Past.OF_PART else LEAST_S
+    """How long a drive, or a test of a part, has to be; of a rig three periods of the vehicle's slowest vibration after
+    what is left out for its past, and of one that nothing drives what there is where that is not known [s]."""
+    past = past_of(drive.track)
+    if past is Past.OF_PART:
+        return _LEAST_OF_PART_S
+    slowest_hz = 0.0
+    if isinstance(drive.track, Excitation) and vehicle is not None:
+        slowest_hz = float(undamped_frequencies_hz(structure_of(vehicle))[0])
+    if not slowest_hz:
+        return 0.0 if past is Past.FREE else LEAST_S
+    return min(past.value + _LEAST_PERIODS / slowest_hz, LEAST_S)
 
 
 def check_decay(drive: Drive) -> None:
@@ -525,7 +530,7 @@ def check_channels(drive: Drive, vehicle: Vehicle) -> None:
                        "sign: change the sign of one of them (both are positive up)")
 
 
-def driven_parts(drive: Drive, on_rig: Bools | None = None) -> list[slice]:
+def driven_parts(drive: Drive, on_rig: Bools | None = None, vehicle: Vehicle | None = None) -> list[slice]:
     """Where in a drive the car moved, or was driven ``on_rig`` (n,), and there were readings.
 
     A gap between readings is left in a part, as samples that nobody read: a cut there would lose the next ``SKIP_S`` as
@@ -539,11 +544,12 @@ def driven_parts(drive: Drive, on_rig: Bools | None = None) -> list[slice]:
     for gap in map(slice, *stretches_of(driven & ~read)):
         between = gap.start > 0 and gap.stop < len(read) and read[gap.start - 1] and read[gap.stop]
         kept[gap] = between and gap.stop - gap.start <= SKIP_S * drive.rate_hz
+    shortest_s = least_s(drive, vehicle)
     parts = [part for part in map(slice, *stretches_of(kept))
-             if np.count_nonzero(read[part]) >= least_s(drive) * drive.rate_hz]
+             if np.count_nonzero(read[part]) >= shortest_s * drive.rate_hz]
     if not parts:
         moving = f" at {SLOWEST_MPS:g} m/s or faster" if on_rig is None else " while its excitation lasts"
-        raise BadInput(f"{drive.path}: expected {least_s(drive):g} s with readings{moving}, without a break of more "
+        raise BadInput(f"{drive.path}: expected {shortest_s:.3g} s with readings{moving}, without a break of more "
                        f"than {SKIP_S:g} s")
     return parts
 
@@ -662,8 +668,10 @@ def check_readings(drive: Drive, others: Sequence[Drive]) -> None:
     check_decay(drive)
     if is_acceleration and counted.std() < _RUN_CHECKS_LEAST_MPS2:
         raise BadInput(f"{drive.file}: expected accelerations in m/s2, found none above {np.abs(counted).max():.2g}")
-    # Three periods of what rings loudly have a mean of their own.
-    own_mean_mps2 = counted.std() if past_of(drive.track) is Past.FREE else 0.0
+    # Three periods of what rings loudly have a mean of their own, and so has what moves for a short time: at most the
+    # range of its speed over that time.
+    own_mean_mps2 = counted.std() if past_of(drive.track) is Past.FREE else float(
+        np.ptp(np.cumsum(counted - counted.mean()))) / len(counted)
     if is_acceleration and abs(counted.mean()) > max(_MOST_MEAN_MPS2, own_mean_mps2):
         raise BadInput(f"{drive.file}: expected gravity to be removed, found {counted.mean():.3g} m/s2 on average")
     # What was laid across gaps is on no step of a coarse sensor, and one at the end of its range rightly stays there.

@@ -45,7 +45,7 @@ class CompareQuestion(LabQuestion):
 
     Each RUN is a folder with drive.csv (t_s,accel_z_mps2,speed_mps,distance_m) and the profile.csv it was driven on,
     or, of a rig, drive.csv (t_s,accel_z_mps2) and the excitation.csv (t_s,elevation_m[,elevation_rear_m]) that drove
-    it. Runs are of one sample rate of 50 Hz or more, and of 5 s or longer.
+    it. Runs are of one sample rate of 50 Hz or more, and of 5 s or longer (on quick rigs less).
 
       ridelog compare --vehicle mycar.yaml run1 run2
       ridelog compare --vehicle mycar.yaml run1 run2 --out compare.html
@@ -184,7 +184,7 @@ class PlanQuestion(LabQuestion):
     add most.
 
     Each RUN is a folder as in 'ridelog compare'. Planned drives cover a whole profile, one at each speed, with 100
-    samples a second and for 5 s or longer.
+    samples a second and for 5 s or longer (on quick rigs less).
 
       ridelog plan --vehicle mycar.yaml --profile road.csv --speed 8 --speed 15
       ridelog plan --vehicle mycar.yaml run1 run2 --out plan.html

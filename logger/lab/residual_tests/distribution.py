@@ -37,7 +37,7 @@ class WhitenessTest(ResidualTest):
 
     def sentence(self, found: ResidualTestResult) -> str:
         """At which lag."""
-        return (f"The residual is not white: samples {found.figures['lag_s'] * 1000:.0f} ms apart have a correlation "
+        return (f"The residual is not white: samples {found.figures['lag_s'] * 1000:.3g} ms apart have a correlation "
                 f"of {found.value:.2f}.")
 
 

@@ -8,14 +8,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
 
 from logger.api.lab.bench import bench_with
 from logger.api.lab.question import CompareQuestion
 from logger.commands.main import main
 from logger.lab.laws.draft import LawContext
 from logger.lab.laws.families.damping_by_travel import FAMILY
+from logger.lab.laws.learn import learn
 from logger.vehicle.compose import compose
-from logger.vehicle.effect import chosen
+from logger.vehicle.effect import ForceEffect, Values, chosen
+from logger.vehicle.laws import linear
 
 from ...support.drives.part_bench import Array, fitted_error, force_of, moved, write_bench
 from ...support.lab.secret_runs import hidden
@@ -53,6 +57,41 @@ def test_a_curve_of_the_travel_multiplies_what_the_damper_does_by_its_rate(tmp_p
     rate_mps = np.gradient(place_m, 1 / 250.0)
     true_n = more_per_m * np.clip(place_m, at_m[0], at_m[-1]) * digressive(rate_mps)
     assert np.std((found - plain - true_n)[kept]) < 0.01 * np.std(true_n)
+
+
+@pytest.mark.slow
+def test_a_magnet_that_brakes_a_mass_where_its_field_is_is_learned(tmp_path: Path) -> None:
+    """A mass of 2.8 kg on a spring, shaken; the field's edge lies at rest, and fades over 30 mm either way."""
+    run, time_s = tmp_path / "run", np.arange(0, 10, 1 / 250.0)
+    drawn = np.fft.rfft(np.random.default_rng(5).standard_normal(len(time_s)))
+    drawn[np.fft.rfftfreq(len(time_s), 1 / 250.0) > 15.0] = 0.0
+    push_n = np.fft.irfft(drawn, len(time_s)) * np.minimum(1.0, time_s) ** 2
+    push_n *= 16.0 / push_n.std()
+    push = CubicSpline(time_s, push_n)
+
+    def rates(t: float, y: Array) -> list[float]:
+        brake = 30.0 * min(max((y[0] + 0.03) / 0.06, 0.0), 1.0)
+        return [y[1], (float(push(t)) - 2400.0 * y[0] - (4.0 + brake) * y[1]) / 2.8]
+
+    went = solve_ivp(rates, (0.0, time_s[-1]), [0.0, 0.0], t_eval=time_s, max_step=2e-3, rtol=1e-8, atol=1e-10).y
+    accel = np.array([rates(*one)[1] for one in zip(time_s, went.T, strict=True)])
+    accel += np.random.default_rng(6).normal(0.0, 0.01, len(time_s))
+    run.mkdir()
+    for name, columns, values in (("excitation", "force_n", [push_n]),
+                                  ("drive", "accel_z_mps2,displacement_m", [accel, went[0]])):
+        np.savetxt(run / f"{name}.csv", np.stack([time_s, *values], axis=1), "%.9g", ",", header=f"t_s,{columns}",
+                   comments="")
+    (run / "run.yaml").write_text("forces: {force_n: {on: body}}\n", "utf-8")
+    rig = tmp_path / "rig.yaml"
+    rig.write_text("name: rig\nmodel: single_mass\nmass_kg: 2.8 +- 2%\nstiffness_n_per_m: 2400 +- 50%\n"
+                   "damping_n_s_per_m: 19 +- 100%\n", "utf-8")
+    posterior = bench_with(CompareQuestion(rig, run)).posterior(searches=True)
+    found = learn(posterior, {}, {"damping_by_travel": FAMILY}, {})
+    assert found.law is not None and isinstance(found.law.draft.effect, ForceEffect)
+    at_m = np.linspace(-0.02, 0.02, 9)
+    laws = found.law.draft.effect.laws(Values(**found.law.one.values), linear(1.0))
+    assert sum(one(at_m, np.ones(9)) for one in laws.others) == pytest.approx(500.0 / 19.0 * at_m, abs=0.03)
+    assert posterior.error(found.law.state) < 0.01
 
 
 @pytest.mark.release

@@ -1,8 +1,8 @@
 """A damping that goes with the travel: F = f |x / x0|^n v / v0.
 
-Of a part alone on its bench such a damping may also follow a smooth curve of the travel, which multiplies the force of
-the damper with all that is known of it: fluid that goes past the piston through grooves or tubes has its way only where
-these are.
+Of a rig such a damping may also follow a smooth curve of the travel, which multiplies the force of the damper with all
+that is known of it: fluid that goes past the piston through grooves or tubes has its way only where these are, and a
+magnet brakes only what is in its field.
 """
 
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded, through_points
@@ -13,7 +13,7 @@ class DampingByTravel(Family):
     title = "damping that depends on suspension travel"
     related_effects = ("damper_blow_off", "damper_asymmetry", "progressive_spring")
     source = "J. C. Dixon, The Shock Absorber Handbook (2007), chapter 3: position-dependent damping"
-    signature = "the damping is larger far from rest than near it"
+    signature = "the damping is larger at one travel than at another"
     shown_by = "drive a rough road slowly, so that the suspension travels far at different rates"
     straight_at = 0.0
     points = 3, 5  # on either side of rest, which is one
@@ -33,7 +33,7 @@ def force_n(p, travel_m, rate_mps):
         power = self.draft(parameters, "def laws(self, p, laws):\n"
                            "    return laws.with_force(lambda travel_m, rate_mps: force_n(p, travel_m, rate_mps))",
                            functions, at="loop", reference=travel_m)
-        curves = self.points if context.vehicle.model == "component" else ()
+        curves = () if context.is_driven else self.points
         return [power, *(self._curve(count, context.reach("travel_m", 0.995)) for count in curves)]
 
     def _curve(self, count: int, reach_m: float) -> Draft:
@@ -50,8 +50,8 @@ def force_n(p, travel_m, rate_mps):
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
         if draft.places:
-            ends = (f"{say(draft.strengths[end])} more at {1000 * draft.places[end]:g} mm" for end in (0, -1))
-            return f"damping that follows a curve of the travel: over that at rest {' and '.join(ends)}"
+            ends = (f"{say(draft.strengths[end])} of that at {1000 * draft.places[end]:g} mm" for end in (0, -1))
+            return f"damping that follows a curve of the travel; from rest it changes by {' and '.join(ends)}"
         return (f"damping that grows with the travel to the power {say('power_ratio')}: "
                 f"{say('force_n')} at {draft.parameters[0].meaning.removeprefix('at ')}")
 
