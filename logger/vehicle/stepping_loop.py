@@ -15,7 +15,6 @@ integrators, Acta Numerica 19, 2010, 2.3).
 """
 
 import math
-import sys
 from collections import namedtuple
 from collections.abc import Callable
 from contextlib import suppress
@@ -37,7 +36,6 @@ try:
     from numba.core.caching import FunctionCache, IndexDataCacheFile
     from numba.core.ccallback import CFunc
     from numba.core.compiler_lock import global_compiler_lock
-    from numba.core.utils import _dynamic_modname, _dynamic_module
 except ImportError:
     COMPILED = False
 else:
@@ -109,7 +107,9 @@ def _machine_code(function: Any, numbers: Any, memory: int, rates: bool = False)
     # Compiled code alone calls these: ways in from Python and C would take half of the time.
     inside: dict[str, Any] = {"error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
     compiled: Any = numba.njit(**inside)
-    own = compiled(function)
+    law = FunctionType(function.__code__, function.__globals__)
+    law.__module__ = __name__  # which a later process finds when it reads machine code; a learned law is in none
+    own = compiled(law)
     pointer = numba.types.CPointer(numba.types.float64)
     of_array: Any = ndarray.to_fixed_tuple
     all_seen: Any = Seen
@@ -163,9 +163,6 @@ def all_said(function: FunctionType) -> str | None:
 
 
 if COMPILED:
-    # Where Numba looks, when it reads machine code, for the module of a law that is in none, as a learned one.
-    sys.modules.setdefault(_dynamic_modname, _dynamic_module)
-
     class _LawCache(FunctionCache):
         """Keeps machine code in a file of this name, beside that of the loops and like it for this processor alone."""
 
