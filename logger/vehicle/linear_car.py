@@ -41,7 +41,8 @@ def dynamic_stiffness(mass: Array, damping: Array, stiffness: Array, s: Complex)
 
 
 def frequency_response(structure: Structure, outputs: Sequence[Output], f_hz: npt.ArrayLike) -> Complex:
-    """Outputs per elevation under each wheel separately, for waves exp(2 pi i f t); no delay, no contact patch.
+    """Outputs per elevation under each wheel separately, and per force from outside (``pushed``), for waves
+    exp(2 pi i f t); no delay, no contact patch.
 
     f_hz (...) [Hz]; returns (..., p, w).
     """
@@ -50,7 +51,9 @@ def frequency_response(structure: Structure, outputs: Sequence[Output], f_hz: np
     coordinates = np.linalg.solve(dynamic, structure.road.astype(complex))
     rows = np.array([output.row for output in outputs])
     orders = np.array([[output.order] for output in outputs])
-    return s[..., None, None] ** orders * (rows @ coordinates) + np.array([output.road_row for output in outputs])
+    by_road = np.array([output.road_row for output in outputs])  # no sensor feels a force from outside but by motion
+    by_input = np.pad(by_road, ((0, 0), (0, structure.road.shape[1] - by_road.shape[1])))
+    return s[..., None, None] ** orders * (rows @ coordinates) + by_input
 
 
 def at_steady_speed(structure: Structure, by_wheel: Complex, wave_number_cpm: Array) -> Complex:

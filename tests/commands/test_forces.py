@@ -2,6 +2,7 @@
 which shares nothing with ridelog."""
 
 import json
+import re
 import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
@@ -999,6 +1000,29 @@ def test_what_a_file_does_not_know_is_found(tmp_path: Path, capsys: pytest.Captu
     part.write_text("name: part\nmodel: component\ndamping_n_s_per_m: 1\nstiffness_n_per_m: 2e4\n")
     with pytest.raises(BadInput, match=r"--free: expected the parameters to fit, as .* gives all of them exactly"):
         main(["identify", "--vehicle", str(part), str(run)])
+
+
+@pytest.mark.parametrize(("bench", "signal", "mass"), [
+    (Bench(2.0, 1e5, 60.0), "displacement_m", "2 +- 5%"),  # 36 Hz
+    (Bench(0.02, 600.0, 0.3), "accel_z_mps2", "unknown"),  # 28 Hz
+    (Bench(50.0, 400.0, 20.0), "velocity_mps", "50 +- 5%"),  # 0.45 Hz
+    (Bench(5.0, 8e3, 30.0, wheel=1.0, tire=3e4), "accel_z_mps2", "5.0"),  # 5.6 and 31 Hz
+], ids=["stiff", "small", "slow", "two-masses"])
+def test_modes_far_from_those_of_a_car_are_found(bench: Bench, signal: str, mass: str, tmp_path: Path,
+                                                 capsys: pytest.CaptureFixture[str]) -> None:
+    """Of a rig whose springs and dampers its file calls unknown."""
+    push = noise(40.0, bench.mass, 7)
+    seen = bench.moved(NOTHING, push, NOTHING)[signal]
+    run = written(tmp_path / "run", {signal: seen + np.random.default_rng(1).normal(0.0, 0.01 * seen.std(), len(seen))},
+                  {"force_n": push(TIME_S)}, BODY)
+    unknown = re.sub(r"((?:stiffness|damping)_\w+): .*", r"\1: unknown", bench.yaml)
+    (rig := tmp_path / "rig.yaml").write_text(re.sub(r"\bmass_kg: .*", f"mass_kg: {mass}", unknown))
+    found = identified(capsys, rig, run)
+    true = {"mass_kg": bench.mass, "stiffness_n_per_m": bench.spring, "damping_n_s_per_m": bench.damper}
+    true |= {f"front.suspension_{name}": true[name] for name in ("stiffness_n_per_m", "damping_n_s_per_m")}
+    true["front.tire_stiffness_n_per_m"] = bench.tire
+    for name, value in found["parameters"].items():
+        assert value == pytest.approx(true[name], abs=4 * found["standard_errors"][name])
 
 
 @pytest.mark.slow

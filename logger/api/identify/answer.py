@@ -16,7 +16,15 @@ import numpy as np
 from logger.api.drives import Run, read_run, run_on_road
 from logger.api.identify.question import MEASURED, OBSTACLES, SAME, IdentifyQuestion
 from logger.api.lab.bench import slow_words, word_of
-from logger.api.lab.checks import check_channels, check_rate, check_readings, check_roads, moves_freely, of_rates
+from logger.api.lab.checks import (
+    check_channels,
+    check_rate,
+    check_readings,
+    check_roads,
+    moves_freely,
+    of_rates,
+    placed,
+)
 from logger.api.shared_fields import each, paths_of
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, check_forces, model_of
@@ -131,7 +139,7 @@ class Identification(CommandResult):
 @function(IdentifyQuestion)
 def identify(question: IdentifyQuestion) -> Identification:
     """The numbers. BadInput and ``NotIdentifiable`` as ``IdentifyQuestion`` says."""
-    model, given = model_of(question.vehicle), each(question.runs)
+    given = each(question.runs)
     if not given:
         raise BadInput("identify: expected a run, found none")
     paths = paths_of(question.runs)
@@ -143,6 +151,7 @@ def identify(question: IdentifyQuestion) -> Identification:
     flat_will_do = bool(question.obstacles) or question.road != MEASURED
     drives = [run_on_road(one, question.warn) if not flat_will_do else one if isinstance(one, Run) else read_run(one)
               for one in given]
+    model = model_of(placed(model_of(question.vehicle), drives))
     records = _records(drives, question, model.vehicle)
     if question.free is None and (question.road != MEASURED or question.obstacles):
         raise question.wrong("free", ": expected the parameters to fit, as the road was not measured")

@@ -17,7 +17,7 @@ import numpy as np
 
 from logger.api.drives import Run as DrivenRun
 from logger.api.drives import run_on_road
-from logger.api.lab.checks import check_model, check_moves, checked_runs, predicted
+from logger.api.lab.checks import check_model, check_moves, checked_runs, placed, predicted
 from logger.api.lab.question import LabQuestion
 from logger.api.shared_fields import Runs, each
 from logger.api.vehicles import model_of
@@ -395,9 +395,10 @@ def _try_own(found: Bench, files: Sequence[str]) -> None:
 def bench_with(question: LabQuestion, searches: str | None = None, thin: bool = True) -> Bench:
     """Vehicle, runs and effects of a question, checked together."""
     given: Any = question
-    model = model_of(given.vehicle)
+    drives = lab_drives(given.runs, question.warn)
+    model = placed(model_of(given.vehicle), drives)
     off = tolerance_of(question.tolerance, model.known)
-    runs = checked_runs(lab_drives(given.runs, question.warn), thin, model.vehicle)
+    runs = checked_runs(drives, thin, model.vehicle)
     return bench_of(word_of(given.vehicle, model), model, runs, list(map(str, getattr(question, "effect_files", ()))),
                     off, searches, question.warn, question.low_pass_hz, question.anyway)
 

@@ -20,6 +20,7 @@ from logger.dsp.repeated_samples import find_repeats, stretches_of
 from logger.dsp.whole_record import thinned
 from logger.errors import BadInput, as_bad_input
 from logger.estimation.batch import BACK_M
+from logger.identification.time_scale import at_time_scale
 from logger.lab.another_car import LikeliestRig, another_car, error_with_best_effect, likeliest_rig
 from logger.lab.likelihood.lag import SLOWEST_MPS
 from logger.lab.likelihood.priors import Tolerance
@@ -65,8 +66,10 @@ from logger.vehicle.effects.sensor_gain import EFFECT as SENSOR_GAIN
 from logger.vehicle.models import structure_of
 from logger.vehicle.modes import body_and_wheels_hz, undamped_frequencies_hz
 from logger.vehicle.named_parameters import WEAKEST
+from logger.vehicle.named_parameters import read as read_number
 from logger.vehicle.simulate import resampled
 from logger.vehicle.stepping_loop import COMPILED
+from logger.vehicle.uncertain import UNKNOWN
 from logger.vehicle.vehicle import Vehicle
 
 _MODEL_CHECKS_LEAST_MPS2 = 1e-4
@@ -350,6 +353,24 @@ _LEAST_RATE_HZ, _CLOCK = 50.0, 0.01
 _MOST_MEAN_MPS2 = 2.0
 _RUN_CHECKS_LEAST_MPS2 = 1e-5  # no sensor is so quiet
 _DISAGREE, _DISAGREE_M = 0.5, 5.0
+
+
+def placed(model: CarModel, drives: Sequence[Drive]) -> CarModel:
+    """The model with what its file calls unknown of a rig where a fit to these drives begins (``at_time_scale``); what
+    was fitted once stays. BadInput as ``check_readings``."""
+    unknown = [name for name, one in model.known.items() if one.words == UNKNOWN]
+    if not unknown or model.given is not None:
+        return model
+    for number, one in enumerate(drives):
+        if one.track is None or not one.track.timed:
+            return model
+        check_readings(one, drives[:number])
+        check_forces(model.vehicle, one.track, str(one.path / RUN))
+        check_channels(one, model.vehicle)
+    runs = [run for one in drives for run in driven_stretches(one)]
+    vehicle = at_time_scale(model.vehicle, unknown, runs)
+    return replace(model, vehicle=vehicle, known={**model.known, **{
+        name: replace(model.known[name], value=read_number(vehicle, name)) for name in unknown}})
 
 
 def checked_runs(drives: Sequence[Drive], thin: bool = True, vehicle: Vehicle | None = None) -> SimulatedRuns:
