@@ -48,11 +48,16 @@ class HoldOut:
 
     def explains_most_beyond(self, without: HoldOut) -> bool:
         """Whether more than half of the power that a smaller model leaves is explained."""
-        return self.error**2 < 0.5 * without.error**2
+        return self.error**2 < most_of(without.error**2)
 
     def is_worse_than(self, without: HoldOut) -> bool:
         """Whether the error is larger than that of a smaller model by more than a rounding."""
         return self.error > (1 + ROUNDING) * without.error
+
+
+def most_of(power: float) -> float:
+    """What explains most of a residual of some power leaves less than this."""
+    return 0.5 * power
 
 
 def folds(run: Run) -> npt.NDArray[np.intp]:

@@ -29,6 +29,7 @@ from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.whittle import LOWEST_HZ, UNEXPLAINED
 from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly
 from logger.lab.selection.evidence import IMITATION, INDISTINGUISHABLE
+from logger.lab.selection.holdout import most_of
 from logger.lab.selection.screening import Baseline, Screened, Trial, effects_without
 from logger.lab.selection.stepwise import MeasuredRoad, Progress, is_outside_data
 from logger.runs import Past, Run
@@ -48,8 +49,8 @@ _Car = tuple[list[Chosen], Array]
 class Started(Screened):
     """An effect that was screened on a model and in cars that were drawn.
 
-    others           the best of these of each kind but the first, with their deviances
-    ends             the first of each kind, improved
+    others           the best of these of each kind that are not improved yet, with their deviances
+    ends             the first of each kind, improved; of kinds with refinements, if its plain form is the best so far
     gain_by_squares  of the best of them over the model, in minus twice the log of the likelihood under white noise
     """
 
@@ -112,12 +113,18 @@ class UnknownNumbers(MeasuredRoad):
         for one in local:
             drafted = one.effect.sought is Sought.NEVER  # by the motions of the records, as it begins
             drawn = [] if drafted else self._cars(by_squares, one.effect, anchor, one.trials, numbers)
-            begun = [some[0][1] for some in drawn]
-            ends = sorted(pool.map(partial(by_squares.improved, to_reach=least), begun), key=_by_deviance)
+            first, others = [some[0] for some in drawn], [each for some in drawn for each in some[1:]]
+            plain = [each for each in first if _is_plain(each)] or first
+            refined = [each for each in first if each not in plain]
+            ends = _improved(pool, by_squares, plain, least)
+            if ends and ends[0][0] < least:
+                ends += _improved(pool, by_squares, refined, _explaining_most(by_squares, ends))
+                ends.sort(key=_by_deviance)
+                refined = []
             if near is not None and one.effect is near.effect and ends and ends[0][0] > known - INDISTINGUISHABLE:
                 continue
-            found.append(Started(one.effect, one.trials, [each for some in drawn for each in some[1:]], ends,
-                                 without - ends[0][0]) if ends else one)
+            found.append(Started(one.effect, one.trials, [*refined, *others], ends, without - ends[0][0])
+                         if ends else one)
             if ends and ends[0][0] < least and not is_outside_data(base.posterior, ends[0][1].effects[-1]):
                 least, best = ends[0]
                 numbers = best.logs if self._shows_the_car(by_squares, anchor, best) else None
@@ -141,19 +148,22 @@ class UnknownNumbers(MeasuredRoad):
 
     def fitted_roughly(self, score: float, base: Baseline, one: Screened, least: float) -> list[CandidateFit]:
         """Fits from the best trial on the model, and from the best of the cars that were drawn: of the effect in its
-        plain form, and with its refinements. Of each form cars are improved until two end alike at the best."""
+        plain form, and with its refinements, where they explain most of what that leaves, or else they are not taken.
+        Of each form cars are improved until two end alike at the best."""
         if not isinstance(one, Started):
             return fit_roughly(score, base, one, least)
         by_squares = self._by_squares(base.posterior)
         ends = [*one.ends]
-        for _, state in one.others:
-            alike = [deviance for deviance, end in ends if end.effects[-1].is_plain is state.effects[-1].is_plain]
-            if len(alike) < 2 or alike[1] > alike[0] + INDISTINGUISHABLE:
-                ends.append(by_squares.improved(state, to_reach=min(alike, default=np.inf)))
+        for other in one.others:
+            alike = [deviance for deviance, end in ends if end.effects[-1].is_plain is _is_plain(other)]
+            needed = np.inf if _is_plain(other) else _explaining_most(by_squares, ends)
+            if len(alike) < 2 or (alike[1] > alike[0] + INDISTINGUISHABLE and alike[0] < needed):
+                ends.append(by_squares.improved(other[1], to_reach=min([needed, *alike])))
                 ends.sort(key=_by_deviance)
         self._keep(ends)
         trials = {trial.one.is_plain: trial for trial in reversed(one.trials)}
-        best = {state.effects[-1].is_plain: state for _, state in reversed(ends)}
+        needed = _explaining_most(by_squares, ends)
+        best = {_is_plain(end): end[1] for end in reversed(ends) if _is_plain(end) or end[0] < needed}
         found = fit_roughly(score, base, replace(one, trials=tuple(trials.values())))
         found += [CandidateFit.of(score, self._likeliest(by_squares.of_all(state, base.state), base.posterior))
                   for state in best.values()]
@@ -296,6 +306,24 @@ def fitted_from_starts(posterior: Posterior, present: Sequence[Chosen]) -> Linea
 
 def _by_deviance(one: tuple[float, *tuple[Any, ...]]) -> float:
     return one[0]
+
+
+def _is_plain(one: _Drawn) -> bool:
+    """Whether the last effect of a car has its plain form."""
+    return one[1].effects[-1].is_plain
+
+
+def _explaining_most(by_squares: BySquares, ends: Sequence[_Drawn]) -> float:
+    """The deviance of a car that explains most of what the best one leaves whose last effect has its plain form."""
+    plain = (end[0] for end in ends if _is_plain(end))
+    return min(plain, default=np.inf) + by_squares.posterior.freedom * float(np.log(most_of(1.0)))
+
+
+def _improved(pool: ThreadPoolExecutor, by_squares: BySquares, begun: Sequence[_Drawn], to_reach: float
+              ) -> list[_Drawn]:
+    """Cars improved as long as they may reach a deviance, the best first."""
+    return sorted(pool.map(partial(by_squares.improved, to_reach=to_reach), [state for _, state in begun]),
+                  key=_by_deviance)
 
 
 def _resized(one: Chosen, rng: np.random.Generator, spread: float) -> Chosen:

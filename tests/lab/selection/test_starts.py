@@ -3,6 +3,7 @@
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -13,6 +14,7 @@ from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.posterior import State
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.whittle import UNEXPLAINED
+from logger.lab.selection import starts
 from logger.lab.selection.screening import Baseline
 from logger.lab.selection.starts import Started, UnknownNumbers
 from logger.vehicle.effect import Misalignment
@@ -95,6 +97,42 @@ def test_more_starts_are_improved_until_two_end_alike_and_what_ends_at_the_model
         without = search.without(now, "sensor_mount_resonance")
         assert not search.screened(without, effects, still, there.effects[0], pool, lambda words: None)
         assert search.screened(without, effects, still, None, pool, lambda words: None)
+
+
+@pytest.mark.slow
+def test_refinements_are_followed_where_they_may_explain_most_of_what_the_plain_form_leaves(
+        monkeypatch: pytest.MonkeyPatch) -> None:
+    posterior = posterior_of(secret_runs([hidden("dry_friction", friction_force_n=60.0)], lasts_s=6.0,
+                                         noise_mps2=0.01), tolerance=Tolerance(numbers=0.5))
+    search, still, effects = UnknownNumbers(draws=8), Misalignment(1.0, 0.0), [EFFECTS["dry_friction"]]
+    base = search.fitted(posterior, ())
+    begun, calls = BySquares.of(posterior).deviance(base.state), list[tuple[bool, float]]()
+    most = begun - 100 + BySquares.of(posterior).posterior.freedom * np.log(0.5)
+
+    def ends_at(plain: float, refined: float) -> list[bool]:
+        """The forms of which cars are improved, if they end so, and then those of which one is fitted."""
+        def improved(self: BySquares, start: State, rounds: int = 12, to_reach: float = np.inf) -> tuple[float, State]:
+            is_plain = not start.effects or start.effects[-1].is_plain
+            calls.append((is_plain, to_reach))
+            return (plain if is_plain else refined) if start.effects else begun, start
+
+        monkeypatch.setattr(BySquares, "improved", improved)
+        calls.clear()
+        with ThreadPoolExecutor(1) as pool:
+            one, = search.screened(base, effects, still, None, pool, lambda words: None)
+        screened = {is_plain for is_plain, _ in calls[1:]}
+        fitted = list[bool]()
+        monkeypatch.setattr(search, "_likeliest", lambda start, _: fitted.append(start.effects[-1].is_plain))
+        fit = SimpleNamespace(gain=0.0, chosen=one.trials[0].one)
+        monkeypatch.setattr(starts.CandidateFit, "of", lambda *given: fit)
+        monkeypatch.setattr(starts, "fit_roughly", lambda *given: [])
+        search.fitted_roughly(base.score, base, one, 0.0)
+        return [False in screened, False in fitted, True in fitted]
+
+    assert ends_at(begun + 100, begun + 100) == [False, False, True]
+    assert ends_at(begun - 100, begun - 120) == [True, False, True]
+    assert all(to_reach == pytest.approx(most) for is_plain, to_reach in calls if not is_plain)
+    assert ends_at(begun - 100, most - 1) == [True, True, True]
 
 
 def test_on_a_road_a_car_is_compared_where_it_was_not_where_another_would_have_been() -> None:
