@@ -302,7 +302,7 @@ class FamilySearch:
     def _with_known(self, found: Selection) -> Selection | None:
         """A model with a law, and known effects sought on top of it where it leaves something that known effects alone
         leave too; None where the law is not needed beside these."""
-        if not exceeds_noise(found.now) or not exceeds_noise(self.selection.now):
+        if not self._leaves_something(found.now) or not self._leaves_something(self.selection.now):
             return found
         law, forces = next(one.effect for one in found.now.effects if one.effect in self.drafts), self._known_forces
         search = replace(self.search, effects=[*forces, law], _promising=set(), _rivals=dict(found.rivals))
@@ -313,6 +313,11 @@ class FamilySearch:
             tried = search.round(whole.now, others, beside=whole.last) if whole.last.on is whole.now else None
             whole = search.go_on(whole, tried)
         return whole if law.name in whole.gains else None
+
+    def _leaves_something(self, model: Baseline) -> bool:
+        """Whether a model leaves more than noise, and than calibration errors. Of a part these leave nothing: a gain of
+        its force is a factor of all forces in it, whose sizes are fitted."""
+        return model.explanation > 0 if self._is_part else exceeds_noise(model)
 
     def _law(self, found: Selection) -> Law | None:
         """The law of a model; None where a known effect explains more in its place."""

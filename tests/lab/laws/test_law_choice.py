@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import Any
 
@@ -38,11 +38,14 @@ class World:
     nothing    laws that say nothing
     related    known effects that no search tries unasked, which all laws may nearly be
     noise      what a model may leave and is no louder than the noise
+    of         what kind of vehicle
+    explains   what a full explanation of what is left would gain
     tried      laws that were fitted to the end
     """
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch, worth: Worth, known: Sequence[str] = (), nothing: str = "",
-                 related: Sequence[str] = (), noise: float = 0.0) -> None:
+                 related: Sequence[str] = (), noise: float = 0.0, of: str = "half_car", explains: float = 0.0
+                 ) -> None:
         all_of_it = sum(max(some.get(cause, 0.0) for some in worth.values())
                         for cause in {cause for some in worth.values() for cause in some})
         self.tried: list[str] = []
@@ -50,7 +53,7 @@ class World:
 
         @dataclass(frozen=True)
         class Model(Made):
-            posterior: Any = None
+            posterior: Any = field(default_factory=lambda: SimpleNamespace(vehicle=SimpleNamespace(model=of)))
 
             @property
             def score(self) -> float:
@@ -74,7 +77,7 @@ class World:
 
         class Tried:
             def __init__(self, effect: Any, base: Any) -> None:
-                self.model = Model((*base.effects, chosen(effect, {})))
+                self.model = Model((*base.effects, chosen(effect, {})), explains)
                 self.effect, self.chosen = effect, self.model.effects[-1]
                 self.gain = base.score - self.model.score
 
@@ -93,7 +96,7 @@ class World:
         effects = {name: NamedEffect(name) for name in (*known, *related)}
         search: Any = Search([effects[name] for name in known], 0, Misalignment(1.0, 0.0), workers=1,
                              effort=SearchEffort(effects=4), likelihood=Likelihood())
-        self.laws = FamilySearch(search, search.run(Model(explains=0.0)), {name: family(name) for name in laws},
+        self.laws = FamilySearch(search, search.run(Model(explains=explains)), {name: family(name) for name in laws},
                                  effects)
 
     def best(self) -> tuple[str, list[str], list[str]] | None:
@@ -133,6 +136,13 @@ def test_known_effects_on_top_of_a_law_count_for_it(monkeypatch: pytest.MonkeyPa
     """Alone it explains less than another law, beside which the known effect explains nothing more."""
     worth = {"A": {"x": 400.0}, "B": {"y": 450.0}, "known": {"y": 300.0, "x": 10.0}}
     assert World(monkeypatch, worth, ["known"]).best() == ("A", ["known"], [])
+
+
+@pytest.mark.parametrize(("of", "beside"), [("half_car", []), ("component", ["known"])])
+def test_of_a_part_no_calibration_leaves_what_a_known_effect_beside_a_law_explains(
+        of: str, beside: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    worth = {"A": {"x": 600.0}, "known": {"y": 40.0}}
+    assert World(monkeypatch, worth, ["known"], noise=50.0, of=of, explains=40.0).best() == ("A", beside, [])
 
 
 def test_where_known_effects_explain_all_a_law_is_decisively_better_or_none(monkeypatch: pytest.MonkeyPatch) -> None:
