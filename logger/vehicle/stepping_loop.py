@@ -18,6 +18,7 @@ import math
 from collections import namedtuple
 from collections.abc import Callable
 from contextlib import suppress
+from dis import get_instructions
 from functools import cache
 from hashlib import sha256
 from itertools import count
@@ -155,7 +156,8 @@ def all_said(function: FunctionType) -> str | None:
     for code in codes:
         codes += [one for one in code.co_consts if isinstance(one, CodeType)]
         constants = [one for one in code.co_consts if not isinstance(one, CodeType)]
-        named = {name: function.__globals__[name] for name in code.co_names if name in function.__globals__}
+        asked = {one.argval for one in get_instructions(code) if one.opname == "LOAD_GLOBAL"}
+        named = {name: function.__globals__[name] for name in sorted(asked & function.__globals__.keys())}
         if not all(isinstance(one, float | int) or one is np or one is math for one in named.values()):
             return None
         said.append((code.co_code, constants, code.co_names, code.co_varnames, named))

@@ -311,6 +311,10 @@ def doubled(p, seen):
     return 2.0 * p.a * seen.rate_mps
 
 
+def a(p, seen):  # what it asks of p is called as it is
+    return 5.0 * p.a * seen.rate_mps
+
+
 def thrice(p, seen):
     return 3.0 * p.a * seen.rate_mps
 
@@ -347,6 +351,7 @@ def test_machine_code_is_kept_of_the_law_that_was_meant(tmp_path: Path, monkeypa
         assert [answer(doubled) for _ in range(2)] == [(20.0, 0), (20.0, 1)]
     monkeypatch.setitem(globals(), "SHARE", 2.5)
     assert answer(shared) == (25.0, 0)
+    assert [answer(a) for _ in range(2)] == [(50.0, 0), (50.0, 1)]
     assert [answer(of_array) for _ in range(2)] == [(20.0, 0)] * 2  # what it holds is not said by its text
 
 
