@@ -54,8 +54,9 @@ over each other by 1/6 (F. Harris, Proceedings of the IEEE 66, 1978)."""
 class DriveSpectra:
     """Blocks (b,) of one drive or several.
 
-    speed_mps    mean of each
-    spread       standard deviation of the speed in each, as a share
+    speed_mps    mean of each, with the same weights
+    spread       standard deviation of the speed in each as a share, the window's squares its weights: a steady rise has
+                 half of that of all samples alike
     power        (b, k) mean one-sided spectrum in each of ``bands`` [m2/s4 per Hz]; NaN: the recorder does not pass it
     noise        (b,) known part of the readings' noise, as a spectrum: its sensor's and its steps' [m2/s4 per Hz]; NaN:
                  not known
@@ -154,6 +155,7 @@ def _blocks(accel_mps2: Array, speed_mps: Array, usable: Bools, rate_hz: float, 
     length = round(BLOCK_S * rate_hz)
     begins = np.arange(0, len(accel_mps2) - length + 1, length // 2)
     taper = np.hanning(length + 1)[:-1]
+    under_taper = taper**2 / float(taper @ taper)
     scale = 2 / (rate_hz * float(taper @ taper))
     firsts = np.array([first for first, _ in bands()])
     last = bands()[-1][1]
@@ -162,8 +164,10 @@ def _blocks(accel_mps2: Array, speed_mps: Array, usable: Bools, rate_hz: float, 
     for some in np.split(begins, range(_AT_ONCE, len(begins), _AT_ONCE)):
         rows = some[:, None] + np.arange(length)
         speeds = speed_mps[rows]
-        mean, spread = speeds.mean(axis=1), speeds.std(axis=1)
-        good = usable[rows].all(axis=1) & (mean > SLOWEST_MPS) & (spread < STEADY * mean)
+        mean = speeds.mean(axis=1)
+        good = usable[rows].all(axis=1) & (mean > SLOWEST_MPS) & (speeds.std(axis=1) < STEADY * mean)
+        mean = speeds @ under_taper
+        spread = np.sqrt((speeds - mean[:, None]) ** 2 @ under_taper)
         readings = accel_mps2[rows[good]]
         own = readings - readings.mean(axis=1, keepdims=True)
         powers = scale * np.abs(np.fft.rfft(own * taper)) ** 2

@@ -11,7 +11,15 @@ from typing import Any
 import numpy as np
 import pytest
 
-from logger.estimation.drive_spectra import DRIVE_SPECTRA, SpectraKeeper
+from logger.estimation.drive_spectra import (
+    BLOCK_S,
+    DRIVE_SPECTRA,
+    DriveSpectra,
+    SpectraKeeper,
+    drive_spectra,
+    middles_hz,
+)
+from logger.identification.unknown_car import BlockRoads, CarKnowledge, LearnedCar, UnknownCar
 from logger.store.formats.vehicle_file import read_model
 from logger.store.log.log_writer import SegmentLog
 from logger.vehicle.uncertain import cars_off
@@ -94,6 +102,33 @@ def test_drives_of_two_cars_are_refused(runs: list[Path], tmp_path: Path) -> Non
     found = called("learn-car", *runs[:2], drive.rename(tmp_path / "strange"), runs[2], "--wheelbase", 2.66)
     assert found.returncode == 1 and len(found.stderr.splitlines()) == 1
     assert "strange: this drive is not from the same car as the others" in found.stderr
+
+
+@pytest.mark.parametrize("within", [0.0, 0.15])
+def test_the_waviness_within_a_drive_is_learned(within: float) -> None:
+    """Powers that are drawn about what a car reads of roads with this deviation from block to block."""
+    rng = np.random.default_rng(1)
+    speed = np.repeat(np.linspace(8.0, 26.0, 10), 30)
+    shape = (len(speed), len(middles_hz()))
+    empty = DriveSpectra(speed, np.zeros(len(speed)), np.ones(shape), np.full(len(speed), 1e-5), np.arange(300) // 100)
+    problem = UnknownCar(empty, CarKnowledge(2.66))
+    x, own = problem.knowledge.mean, within * rng.standard_normal(len(speed))
+    roads = BlockRoads(rng.normal(-12.0, 0.7, len(speed)), own, np.zeros(3))
+    road, noise = problem.expected_power(x, roads)
+    problem.power = (road + noise) * rng.gamma(problem.weight) / problem.weight
+    found, _ = problem.with_blocks(x, problem.start(x))
+    learned = LearnedCar(problem.knowledge, x, np.eye(len(x)), found, 0.0, True)
+    assert problem.waviness_within(learned) == pytest.approx(max(float(own.std()), 0.06), abs=0.04)
+
+
+def test_the_spread_of_a_speed_is_that_under_the_window() -> None:
+    """By steady rises: the squares of a Hann window have a variance of (1 / 12 - 5 / (8 pi2)) of their length's square.
+    """
+    time_s = np.arange(3000) / 100
+    noise = np.random.default_rng(0).standard_normal(3000)
+    spectra = drive_spectra(noise, 10 + 0.2 * time_s, np.ones(3000, bool), 100.0)
+    deviation = 0.2 * BLOCK_S * np.sqrt(1 / 12 - 5 / (8 * np.pi**2))
+    np.testing.assert_allclose(spectra.spread * spectra.speed_mps, deviation, rtol=1e-3)
 
 
 @pytest.mark.slow
