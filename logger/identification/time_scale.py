@@ -5,7 +5,7 @@ response of one resonance says nothing about another far from it. Solution: one 
 that on the springs squared and on the dampers, at the same masses (dimensional analysis). It is tried over all modes
 that the records can show, with a second factor on all dampers, and then one on each spring and damper; the fit begins
 where the response of the linear model is likest to the records, whatever their size. Where forces drove it and none of
-its masses is known either, the size is that of the records.
+its masses is known either, the size is that of the records. What was only let go rings at its slowest mode.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _PART_S = 25.0
 
 def at_time_scale(vehicle: Vehicle, unknown: Collection[str], runs: Sequence[Run]) -> Vehicle:
     """The vehicle with those of its numbers that are ``unknown`` where its linear model is likest to what runs of a rig
-    recorded. The same vehicle where no spring is unknown, or nothing drives any of the runs.
+    recorded. The same vehicle where no spring is unknown.
 
     unknown    names of numbers, as ``named_parameters`` has them
     """
@@ -45,15 +45,21 @@ def at_time_scale(vehicle: Vehicle, unknown: Collection[str], runs: Sequence[Run
     dampers = [name for name in unknown if name.endswith("damping_n_s_per_m")]
     driven = [run for run in runs if run.timed and run.past is not Past.FREE]
     modes_hz = undamped_frequencies_hz(structure_of(vehicle))
-    if not springs or not driven or not modes_hz.any():
+    if not springs or not modes_hz.any():
         return vehicle
+    first_hz = float(modes_hz[modes_hz > 0].min())
+
+    def quickened(quicker: float, damped: float) -> Vehicle:
+        return changed(vehicle, {name: quicker**2 * read(vehicle, name) for name in springs}
+                       | {name: damped * quicker * read(vehicle, name) for name in dampers})
+
+    if rings_hz := ringing_hz(runs):
+        return quickened(float(np.median(rings_hz)) / first_hz, min(_DAMPED))
     records = [_Spectra.of(run.part(slice(round((run.skip_s + _PART_S) * run.rate_hz))), vehicle) for run in driven]
     slowest_hz = _PERIODS / max(run.count / run.rate_hz for run in driven)
     quickest_hz = min(run.rate_hz for run in driven) / 2
     count = int(np.ceil(np.log(quickest_hz / slowest_hz) / np.log(_QUICKER))) + 1
-    cars = [changed(vehicle, {name: quicker**2 * read(vehicle, name) for name in springs}
-                    | {name: damped * quicker * read(vehicle, name) for name in dampers})
-            for quicker in np.geomspace(slowest_hz, quickest_hz, count) / modes_hz[modes_hz > 0].min()
+    cars = [quickened(quicker, damped) for quicker in np.geomspace(slowest_hz, quickest_hz, count) / first_hz
             for damped in (_DAMPED if dampers else (1.0,))]
 
     def likeness(one: Vehicle) -> float:
@@ -68,6 +74,19 @@ def at_time_scale(vehicle: Vehicle, unknown: Collection[str], runs: Sequence[Run
         return best
     heavier = np.exp(-np.mean([np.log(record.gain(best)) for record in records]))
     return changed(best, {name: heavier * read(best, name) for name in sizes})
+
+
+def ringing_hz(runs: Sequence[Run]) -> list[float]:
+    """The strongest frequency of what each run did after it was let go, above drifts; none where something drove one.
+    """
+    found = []
+    for run in runs if all(one.past is Past.FREE for one in runs) else ():
+        read_ = run.kept_mps2 - run.kept_mps2.mean()
+        count = 2**(len(read_) - 1).bit_length() * 8  # lines closer than a lightly damped mode is wide
+        hz = np.fft.rfftfreq(count, 1 / run.rate_hz)
+        drifts = hz < _PERIODS * run.rate_hz / len(read_)
+        found.append(float(hz[np.argmax(np.abs(np.fft.rfft(read_ * np.hanning(len(read_)), count)) * ~drifts)]))
+    return found
 
 
 @dataclass(frozen=True, eq=False)

@@ -85,6 +85,9 @@ def test_a_mode_that_is_too_sharp_to_be_met_by_chance_is_found(tmp_path: Path) -
                                         "stiffness_n_per_m: unknown\ndamping_n_s_per_m: unknown\n")
     found = json.loads(called("compare", "--json", "--vehicle", tmp_path / "leaf.yaml", *runs).stdout)
     assert found["refitted"]["error"] < 0.05
+    numbers = json.loads(called("identify", "--json", "--vehicle", tmp_path / "leaf.yaml", *runs).stdout)["parameters"]
+    assert numbers["stiffness_n_per_m"] / numbers["mass_kg"] == pytest.approx(omega**2, rel=1e-3)
+    assert numbers["damping_n_s_per_m"] / numbers["mass_kg"] == pytest.approx(2 * 0.0008 * omega, rel=0.02)
 
 
 @pytest.mark.slow

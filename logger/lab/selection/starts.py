@@ -20,19 +20,19 @@ from zlib import crc32
 import numpy as np
 
 from logger.arrays import Array
+from logger.identification.time_scale import ringing_hz
 from logger.lab.likelihood.by_squares import BySquares
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit, fit_model
 from logger.lab.likelihood.noise_floor import floor_error, sensor_noise_of
 from logger.lab.likelihood.posterior import NotSimulated, Posterior, State
 from logger.lab.likelihood.priors import Tolerance
-from logger.lab.likelihood.whittle import LOWEST_HZ, UNEXPLAINED
+from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly
 from logger.lab.selection.evidence import IMITATION, INDISTINGUISHABLE
 from logger.lab.selection.holdout import most_of
 from logger.lab.selection.screening import Baseline, Screened, Trial, effects_without
 from logger.lab.selection.stepwise import MeasuredRoad, Progress, is_outside_data
-from logger.runs import Past, Run
 from logger.simulation.virtual_drive import SEARCH_HZ
 from logger.vehicle.effect import Chosen, Effect, Misalignment, Sought, chosen
 from logger.vehicle.models import structure_of
@@ -245,7 +245,7 @@ class UnknownNumbers(MeasuredRoad):
         many with its refinements. A state without the effect is in a valley of its own, whose cars are the better ones
         before they are improved. What was let go rings at a mode, which may be too sharp to be drawn by chance: half of
         them have one there."""
-        prior, ringing_hz = posterior.prior, _ringing_hz(posterior.runs.runs)
+        prior, rings_hz = posterior.prior, ringing_hz(posterior.runs.runs)
         spread = np.minimum(prior.deviations, WEAKEST * prior.steps / prior.steps.max())  # of lengths, which waves show
         rng = np.random.default_rng(crc32((effect.name if effect else "").encode()))
         trials = [chosen(effect, values) for values in effect.trials()] if effect else []
@@ -255,8 +255,8 @@ class UnknownNumbers(MeasuredRoad):
             logs = near.logs * (number % 2)
             if number > 1:
                 logs = logs + spread * rng.standard_normal(len(logs))
-                if ringing_hz and number // 2 % 2:
-                    logs = _tuned(posterior, logs, ringing_hz[number // 4 % len(ringing_hz)])
+                if rings_hz and number // 2 % 2:
+                    logs = _tuned(posterior, logs, rings_hz[number // 4 % len(rings_hz)])
             effects = [_resized(one, rng, WEAKEST) for one in near.effects]
             pair, kind = divmod(number, len(drawn))
             if forms:
@@ -265,18 +265,6 @@ class UnknownNumbers(MeasuredRoad):
                 effects.append(_resized(some[pair % len(some)], rng, float(np.log(10.0)) / 2))
             drawn[kind].append((effects, logs))
         return drawn
-
-
-def _ringing_hz(runs: Sequence[Run]) -> list[float]:
-    """The strongest frequency of what each run did after it was let go, above drifts; none where something drove one.
-    """
-    found = []
-    for run in runs if all(one.past is Past.FREE for one in runs) else ():
-        read = run.kept_mps2 - run.kept_mps2.mean()
-        count = 2**(len(read) - 1).bit_length() * 8  # lines closer than a lightly damped mode is wide
-        hz = np.fft.rfftfreq(count, 1 / run.rate_hz)
-        found.append(float(hz[np.argmax(np.abs(np.fft.rfft(read * np.hanning(len(read)), count)) * (hz > LOWEST_HZ))]))
-    return found
 
 
 def _tuned(posterior: Posterior, logs: Array, hz: float) -> Array:
