@@ -688,10 +688,10 @@ def test_rubber_that_creeps_is_no_mass_on_a_spring(tmp_path: Path, capsys: pytes
     rig = str(tmp_path / "rig.yaml")
     assert main(["diagnose", "--vehicle", rig, "--tolerance", "unknown", str(run), "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
-    assert found["verdict"] == ["spring_with_memory"] and not found["unexplained"]
+    assert found["verdict"] == ["maxwell_element"] and not found["unexplained"]
     numbers = found["candidates"][0]["parameters"]
-    assert numbers["creep_time_s"] == pytest.approx(creep_s, rel=0.05)
-    assert numbers["creeping_stiffness_n_per_m"] == pytest.approx(creeping, rel=0.05)
+    assert numbers["relaxation_time_s"] == pytest.approx(creep_s, rel=0.05)
+    assert numbers["maxwell_stiffness_n_per_m"] == pytest.approx(creeping, rel=0.05)
 
 
 def test_a_blow_on_a_quick_rig_needs_three_of_its_periods(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

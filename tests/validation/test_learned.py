@@ -41,7 +41,7 @@ def test_every_effect_off_the_list_has_a_family_and_every_meaning_a_name() -> No
 
 def test_every_family_has_a_meaning() -> None:
     assert catalogue("logger.lab.laws.families", "FAMILY").keys() == (
-        set().union(*NAMES.values()) - {REMOVED_DRIFT, "hysteresis", "spring_with_memory"})
+        set().union(*NAMES.values()) - {REMOVED_DRIFT, "hysteresis", "maxwell_element"})
 
 
 def test_a_sensor_that_drifts_is_said_and_needs_no_law() -> None:

@@ -154,7 +154,7 @@ def test_rubber_that_creeps_moves_as_newton_says(creep_s: float, plain: np.ndarr
         force = stiffness * (x - z[0])  # z: how far its damper has gone
         return force, -force, [force / (stiffness * creep_s)]
 
-    states, _ = stepped(effect("spring_with_memory", creeping_stiffness_n_per_m=stiffness, creep_time_s=creep_s))
+    states, _ = stepped(effect("maxwell_element", maxwell_stiffness_n_per_m=stiffness, relaxation_time_s=creep_s))
     assert off(states, by_newton(added, 1)[:, :4], plain) < 0.01
 
 
@@ -398,7 +398,7 @@ def test_hysteresis_is_linearised_as_wen_has_it(height: float) -> None:
 
 
 @pytest.mark.parametrize("one", [effect("hysteresis", yield_force_n=60.0, yield_travel_m=0.002),
-                                 effect("spring_with_memory", creeping_stiffness_n_per_m=8e3, creep_time_s=0.1),
+                                 effect("maxwell_element", maxwell_stiffness_n_per_m=8e3, relaxation_time_s=0.1),
                                  effect("frame_friction", friction_force_n=20.0, body_friction_force_n=20.0)])
 def test_a_linear_one_moves_as_the_simulation_does(one: Chosen) -> None:
     """On a random road of the spectrum: the body's r.m.s. speed, beside that of a car without it."""
@@ -496,7 +496,7 @@ def test_which_a_search_tries_unasked() -> None:
     assert {"hysteresis", "frame_friction"}.isdisjoint(known_effects(model, [])[0])
     assert known_effects(model, [], on_rig=True)[0].keys() - known_effects(model, [])[0] == {
         "constant_force", "force_limit", "frame_damping", "frame_friction", "orifice_damping", "play",
-        "spring_with_memory"}
+        "maxwell_element"}
     assert known_effects(model, ["hysteresis"])[0].keys() - known_effects(model, [])[0] == {"hysteresis"}
     assert sought_effects(True, of_part=True).keys() - sought_effects(True) == {"hysteresis"}
     with pytest.raises(BadInput, match="each effect once, found dry_friction again"):

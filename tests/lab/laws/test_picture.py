@@ -25,7 +25,7 @@ def drawn(**values: float) -> Curves:
     part = SimpleNamespace(vehicle=replace(context.vehicle, model="component"), reach=context.reach)
     draft = SLIDING.drafts(part)[0]  # type: ignore[arg-type]
     usual = {one.name: one.start for one in draft.parameters}
-    yields_m = values["yield_m"] if "yield_m" in values else usual["sliding_rate_m_per_s"] * values["creep_time_s"]
+    yields_m = values["yield_m"] if "yield_m" in values else usual["sliding_rate_m_per_s"] * values["relaxation_time_s"]
     known = {"power_ratio": values["power_ratio"], "yield_travel_m": yields_m, "sliding_force_n": 8000.0 * yields_m}
     found = picture(draft, chosen(draft.effect, usual | known), NumberErrors({}, ()), context)
     assert found is not None
@@ -42,7 +42,7 @@ def test_a_friction_that_does_not_slide_yet_is_a_spring() -> None:
 
 def test_a_damper_behind_a_spring_draws_a_loop() -> None:
     """A branch of Maxwell loses pi k X^2 w T / (1 + w^2 T^2) a turn."""
-    found = drawn(power_ratio=1.0, creep_time_s=1 / (2 * np.pi * _LOOP_HZ))
+    found = drawn(power_ratio=1.0, relaxation_time_s=1 / (2 * np.pi * _LOOP_HZ))
     for line in found.lines:
         half_m = float(np.ptp(line.x)) / 2
         assert abs(float(np.trapezoid(line.y, line.x))) == pytest.approx(np.pi * 8000.0 * half_m**2 / 2, rel=0.02)

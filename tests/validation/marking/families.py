@@ -26,7 +26,7 @@ NAMES: dict[str, frozenset[str]] = {
     BY_BOTH: frozenset({"damping_by_travel"}),
     BY_TIRE: frozenset({"tire_force"}),
     FRICTION: frozenset({"hysteresis"}),
-    RUBBER: frozenset({"spring_with_memory"}),
+    RUBBER: frozenset({"maxwell_element"}),
     PLAY: frozenset({"damper_backlash", "sliding_behind_spring"}),
     HEAT: frozenset({"damper_heat"}),
     MASS: frozenset({"hung_mass"}),

@@ -33,7 +33,7 @@ def structure(self, p, structure):
 
 class InertiaBehindSpring(Family):
     title = "inertia beside the springs, perhaps in series with one"
-    related_effects = ("top_mount_compliance", "spring_with_memory", "hysteresis")
+    related_effects = ("top_mount_compliance", "maxwell_element", "hysteresis")
     source = ("M. C. Smith, IEEE Trans. Automatic Control 47 (2002) 1648: the inerter; W. C. Flower, SAE 850975 "
               "(1985): hydraulic mounts")
     signature = "the suspension is softer below a frequency, and stiffer above it"

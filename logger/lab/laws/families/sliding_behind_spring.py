@@ -28,7 +28,7 @@ def rates(p, seen):
 
 class SlidingBehindSpring(Family):
     title = "friction in series with a spring, in a part on a bench"
-    related_effects = ("hysteresis", "spring_with_memory", "top_mount_compliance", "dry_friction")
+    related_effects = ("hysteresis", "maxwell_element", "top_mount_compliance", "dry_friction")
     source = ("F. H. Norton, The Creep of Steel at High Temperatures (1929); P. Perzyna, Advances in Applied Mechanics "
               "9 (1966) 243")
     signature = "small motions meet a spring, larger ones a force that hardly grows"

@@ -16,20 +16,20 @@ from logger.vehicle.laws import Between, CornerLaws, Seen
 
 def force(p: Any, seen: Seen) -> Any:
     """In the suspension [N]."""
-    return p.creeping_stiffness_n_per_m * seen.memory[0]
+    return p.maxwell_stiffness_n_per_m * seen.memory[0]
 
 
 def rates(p: Any, seen: Seen) -> tuple[Any]:
     """How fast the stretch grows [m/s]."""
-    return (seen.rate_mps - seen.memory[0] / p.creep_time_s,)
+    return (seen.rate_mps - seen.memory[0] / p.relaxation_time_s,)
 
 
-class SpringWithMemory(ForceEffect):
-    title = "a spring with memory: rubber that creeps (Maxwell)"
+class MaxwellElement(ForceEffect):
+    title = "Maxwell element: rubber that creeps"
     parameters = (
-        Parameter("creeping_stiffness_n_per_m", 1e4, 0.0, 1e6, 0.0, Scale.LINEAR, (1e4,),
-                  "of the rubber when it has no time to creep, beside the suspension's own"),
-        Parameter("creep_time_s", 0.1, 0.005, 5.0, None, Scale.LOG, (0.02, 0.07, 0.25),
+        Parameter("maxwell_stiffness_n_per_m", 1e4, 0.0, 1e6, 0.0, Scale.LINEAR, (1e4,),
+                  "of its spring, beside the suspension's own"),
+        Parameter("relaxation_time_s", 0.1, 0.005, 5.0, None, Scale.LOG, (0.02, 0.07, 0.25),
                   "in which its force falls to 37 %"),
         AXLE,
     )
@@ -41,9 +41,9 @@ class SpringWithMemory(ForceEffect):
     sought_last = True
 
     def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
-        if p.creeping_stiffness_n_per_m == 0:
+        if p.maxwell_stiffness_n_per_m == 0:
             return laws
         return laws.with_law(Between.BODY_AND_WHEEL, force, p, rates, memory=(0.0,))
 
 
-EFFECT = SpringWithMemory()
+EFFECT = MaxwellElement()
