@@ -366,6 +366,21 @@ def test_uneven_clocks_are_laid_on_even_times_and_nothing_is_compared_beyond_the
     assert not_driven == ([pytest.approx(12.0 - excitation_ends_s, abs=0.02)] if excitation_ends_s < 12 else [])
 
 
+def test_a_part_may_be_moved_by_its_velocity(tmp_path: Path) -> None:
+    """As a bench of dampers writes it, its sensor 3 mm/s off."""
+    w = 2 * np.pi * 20 / TIME_S[-1]
+    velocity_mps, way_m = 0.4 * np.cos(w * TIME_S), 0.4 / w * np.sin(w * TIME_S)
+    run = written(tmp_path / "run", {"force_n": 2e4 * way_m + 900 * velocity_mps},
+                  {"velocity_mps": velocity_mps + 3e-3}, "source: me\n")
+    (part := tmp_path / "part.yaml").write_text("name: part\nmodel: component\nstiffness_n_per_m: 2e4\n"
+                                                "damping_n_s_per_m: 900\n")
+    assert ridelog.compare(part, run).error < 1e-3
+    np.savetxt(run / "excitation.csv", np.stack([TIME_S, velocity_mps, way_m], axis=1), "%.9g", ",",
+               header="t_s,velocity_mps,force_n", comments="")
+    with pytest.raises(BadInput, match=r"a part that is moved \(displacement_m or velocity_mps\) or forces on it, "):
+        ridelog.compare(part, run)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("fault", "jitter", "lost", "why"), [
     ("gaps", 0.0, 102, "without a reading"), ("gaps", 0.3, 102, "without a reading"),

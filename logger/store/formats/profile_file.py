@@ -467,8 +467,9 @@ _OTHER_UNIT = re.compile("(force|elevation|displacement)(_[a-z0-9]+)*?_(kn|mn|lb
 
 def read_excitation(path: Path | str, forces: Sequence[AppliedForce] = ()) -> Excitation:
     """Read CSV ``t_s`` with ``elevation_m[,elevation_rear_m]``, forces (``force_n``, ``force_NAME_n``), or both; or
-    of a part alone ``displacement_m``. It begins at the file's own time, and has even ones (``laid_evenly``). A
-    ``velocity_mps`` beside that is not read: the displacement says it.
+    of a part alone ``displacement_m`` or ``velocity_mps``. It begins at the file's own time, and has even ones
+    (``laid_evenly``). A velocity beside a displacement is not read; one alone is integrated, an offset of its sensor
+    taken out by bringing the part back at the end.
 
     forces    what each of its forces acts on
 
@@ -480,7 +481,7 @@ def read_excitation(path: Path | str, forces: Sequence[AppliedForce] = ()) -> Ex
     names, table, file = parse_columns(
         read_bounded(path, MAX_BYTES), str(path), partial(_driving, file=str(path)),
         f"the header {','.join(EXCITATION_COLUMNS[:2])}[,{EXCITATION_COLUMNS[2]}][,force_n][,force_NAME_n], in metres "
-        f"and newtons, or of a part alone {','.join(PART_COLUMNS[:2])}")
+        f"and newtons, or of a part alone {','.join(PART_COLUMNS[:2])} or {TIME},{PART_COLUMNS[2]}")
     if len(table) < fewest:
         raise BadInput(f"{place(file, len(table))}: expected at least {fewest} samples, found the end of the file")
     pushes = tuple(name for name in names if _FORCE.fullmatch(name))
@@ -492,15 +493,26 @@ def read_excitation(path: Path | str, forces: Sequence[AppliedForce] = ()) -> Ex
                        f"found {', '.join(names)}")
     columns = {name: taken(FORCE if name in pushes else ELEVATION, name, column, file)
                for name, column in zip(names[1:], table.T[1:], strict=True)}
-    heights = tuple(name for name in (*EXCITATION_COLUMNS, PART_COLUMNS[1]) if name in columns)
+    moves_part = names[1] in PART_COLUMNS
+    heights = names[1:2] if moves_part else tuple(name for name in EXCITATION_COLUMNS if name in columns)
     rate_hz, laid, read = laid_evenly(table[:, 0], np.stack([columns[name] for name in (*heights, *pushes)], axis=1),
                                       np.ones(len(table)), file)
     if not read.all():
         even_rate_hz(table[:, 0], file)
     moved = laid[:, :len(heights)] if heights else np.zeros((len(laid), 1))
+    if heights == PART_COLUMNS[2:]:
+        way = _integral(moved) / rate_hz
+        moved = way - np.linspace(0.0, way[-1], len(way))
     return Excitation(rate_hz, moved if len(heights) > 1 else moved[:, 0].copy(), float(table[0, 0]),
                       laid[:, len(heights):] if pushes else None, tuple(known[name] for name in pushes),
-                      PART_COLUMNS[1] in names)
+                      moves_part)
+
+
+def _integral(samples: Array) -> Array:
+    """Of samples (n, c) from the first one on, in steps: by the cubic through the four samples around each step."""
+    around = np.concatenate([2 * samples[:1] - samples[1:2], samples, 2 * samples[-1:] - samples[-2:-1]])
+    steps = (13 * (around[1:-2] + around[2:-1]) - around[:-3] - around[3:]) / 24
+    return np.concatenate([np.zeros_like(samples[:1]), np.cumsum(steps, axis=0)])
 
 
 def _driving(names: tuple[str, ...], file: str) -> tuple[str, ...] | None:
@@ -510,8 +522,9 @@ def _driving(names: tuple[str, ...], file: str) -> tuple[str, ...] | None:
         raise BadInput(f"{file}:1: expected elevations in metres and forces in newtons (elevation_m, force_n), found "
                        f"{other[0]}: convert its numbers")
     heights = tuple(name for name in names if not _FORCE.fullmatch(name))
-    moved = heights in (PART_COLUMNS[:2], PART_COLUMNS)
+    moved = heights in (PART_COLUMNS[:2], PART_COLUMNS, (TIME, PART_COLUMNS[2]))
     if moved and heights != names:
-        raise BadInput(f"{file}:1: expected a part that is moved (displacement_m) or forces on it, found both")
+        raise BadInput(f"{file}:1: expected a part that is moved ({' or '.join(PART_COLUMNS[1:])}) or forces on it, "
+                       "found both")
     fits = moved or heights in (EXCITATION_COLUMNS[:1], EXCITATION_COLUMNS[:2], EXCITATION_COLUMNS)
     return names if fits and len(set(names)) == len(names) > 1 else None
