@@ -27,7 +27,6 @@ from logger.runs import Run, normalised_rms_error
 from logger.simulation.virtual_drive import SEARCH_HZ, SimulatedRuns
 from logger.vehicle.effect import Chosen, Effect, ForceEffect
 from logger.vehicle.effects.sensor_gain import EFFECT as SENSOR_GAIN
-from logger.vehicle.stepping_loop import COMPILED
 from logger.vehicle.vehicle import Vehicle
 
 POOR_ERROR, _GOOD_ERROR = 0.8, 0.35
@@ -167,6 +166,8 @@ def error_with_best_effect(runs: SimulatedRuns, vehicle: Vehicle, present: Seque
                            known: Mapping[str, Effect], numbers: float) -> float:
     """Error of this car with the one effect that explains most, its numbers refitted under their prior; infinite
     where none can be tried. Without the compiler forces are not, as each would take minutes."""
+    from logger.vehicle.stepping_loop import COMPILED  # loads the compiler, if there is one
+
     posterior = Posterior(runs, vehicle, Tolerance(numbers=numbers))
     obstacles = obstacles_of(posterior, known, present)
     tried = [one for name, one in known.items()

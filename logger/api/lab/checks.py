@@ -68,7 +68,6 @@ from logger.vehicle.modes import body_and_wheels_hz, undamped_frequencies_hz
 from logger.vehicle.named_parameters import WEAKEST
 from logger.vehicle.named_parameters import read as read_number
 from logger.vehicle.simulate import resampled
-from logger.vehicle.stepping_loop import COMPILED
 from logger.vehicle.uncertain import UNKNOWN
 from logger.vehicle.vehicle import Vehicle
 
@@ -314,6 +313,8 @@ def _another_car(word: str, model: CarModel, runs: SimulatedRuns, predictions: S
     # An effect in the model's car may explain as much as another car does, and both may have come down to the noise.
     if found is not None and error_with_best_effect(found.runs, model.vehicle, model.effects, known, numbers) > (
             1 + ROUNDING) * found.found_error:
+        from logger.vehicle.stepping_loop import COMPILED  # loads the compiler, if there is one
+
         far = some([f"{name} {share:+.0%}" for name, share in found.shares.items()], more="more parameters far off")
         yield (f"{runs.runs[0].name}: expected a drive of the car in {word}, found one of another car: the file's "
                f"model explains next to nothing of it (NRMSE {found.error:.2f}), a model with "
