@@ -383,12 +383,13 @@ def _rub(
 ) -> None:
     """Find the dry friction at the rates that each pair has a little after the middle of the step, and add what it does
     to what is seen. What the others do to a suspension's rate is so little that theirs of before serves for those that
-    come after it; where a wheel rubs on its guide too, they are gone through in some ``sweeps``.
+    come after it; where a wheel rubs on its guide too, they are gone through in some ``sweeps``, until none changes.
 
     earlier    (f,) the rates at the beginning, as they count for that instant
     """
     count = len(rubs)
     for _ in range(sweeps):
+        settled = True
         for i in range(count):
             row = rubs_at[i, RATE_ROW]
             free = motion[row] + earlier[i]
@@ -402,7 +403,10 @@ def _rub(
                 for _ in range(_PASSES):
                     slides = at * (free - ease * force) / rubs[i, STRIBECK_MPS]
                     force = _friction(free, ease, most + more * np.exp(-slides * slides), transition)
+            settled = settled and abs(force - forces[2 * w + i]) <= _HARDLY * most
             forces[2 * w + i] = force
+        if settled:
+            break
     for i in range(count):
         for r in range(m, len(motion)):
             motion[r] += by_force[2 * w + i, r] * forces[2 * w + i]
@@ -499,8 +503,7 @@ def _settle(
     seen = m // LANES * LANES
     for _ in range(passes):
         _sum(motion, seen, before, forces, 2 * w, by_force)
-        if len(rubs):
-            _rub(motion, m, forces, w, rubs, rubs_at, by_force, earlier, sweeps)
+        _rub(motion, m, forces, w, rubs, rubs_at, by_force, earlier, sweeps)
         for i in range(w):
             forces[i] = _suspension(i, tables, pairs, numbers, motion[m + i], motion[m + w + i], mounts, step_s)
             forces[w + i] = _tire(i, tables, numbers, motion[m + 2 * w + i] - road[i],
@@ -544,13 +547,10 @@ def _walk(
             recorded[k + 1, i] += forces[i]
         # Dry friction is the mean over a step: at an instant it is half that of the step before, half of the next.
         for i in range(len(rubs)):
-            half, strut, tire = 0.5 * forces[2 * w + i], rubs_at[i, ON_SUSPENSION], rubs_at[i, ON_TIRE]
-            if strut >= 0:
-                recorded[k, strut] += half
-                recorded[k + 1, strut] += half
-            if tire >= 0:
-                recorded[k, tire] += half
-                recorded[k + 1, tire] += half
+            for column in (rubs_at[i, ON_SUSPENSION], rubs_at[i, ON_TIRE]):
+                if column >= 0:
+                    recorded[k, column] += 0.5 * forces[2 * w + i]
+                    recorded[k + 1, column] += 0.5 * forces[2 * w + i]
 
 
 @_compiled_with_arrays
