@@ -60,7 +60,7 @@ def test_pictures_hold_finite_numbers_and_what_they_promise(found: LabComparison
     assert not re.search(r"\b(nan|inf)\b", html)
     captions = re.findall(r"<figcaption>(.*?)</figcaption>", html)
     assert len(captions) == 10  # three drives, two spectra, the road, force by rate and travel, alignment
-    assert any("By rate of the suspensions: explains" in one for one in captions)
+    assert any("By velocity: explains" in one for one in captions)
     assert html.count("<svg") == 10
     drawn = re.findall(r'<path class="thick[^"]*" d="M([^"]*)"', html)
     assert drawn and all(len(one.split()) >= 2 for one in drawn)

@@ -405,13 +405,13 @@ def _places(standing: Standing) -> Section:
 
 
 def forces_section(forces: ForceMap) -> Detail:
-    """The force that is missing in the suspensions, by speed and by travel."""
+    """The force that is missing beside springs and dampers, by velocity and by travel."""
     return Detail("The missing force", [
         *(Curves(title, x_name, "force [N]", (Line("missing force", curve.at * factor, curve.force_n,
                                                    errors=curve.error_n),), (0.0, "nothing missing"))
           for title, x_name, curve, factor in (
-              (_titled("By rate of the suspensions", forces.by_rate), "extension rate [m/s]", forces.by_rate, 1.0),
-              (_titled("By travel of the suspensions", forces.by_travel), "extension [mm]", forces.by_travel, 1000.0))),
+              (_titled("By velocity", forces.by_rate), "velocity of extension [m/s]", forces.by_rate, 1.0),
+              (_titled("By travel", forces.by_travel), "extension [mm]", forces.by_travel, 1000.0))),
         Hint("The force, in addition to a linear spring or damper, that would explain the residual, with its standard "
              "error. A positive force pulls both ends together; compression is left, extension right. Distrust a curve "
              "that explains little of the residual.")])

@@ -538,7 +538,7 @@ def shape_sections(found: LabDiagnosis) -> list[Section]:
         return []
     forces = found.shape.tests.forces
     elsewhere = Detail("The missing force", [
-        "No force in the suspensions that depends on their rate or travel would explain it: it comes from elsewhere."])
+        "No force of a spring or damper, by travel or velocity, would explain it: it comes from elsewhere."])
     return [Section("What no effect explains", [Bullets(looks_like(found))]), _where(found.shape),
             Detail("By frequency", spectra(found.shape.residuals)),
             elsewhere if max(forces.by_rate.share, forces.by_travel.share) < _LEAST_SHARE else forces_section(forces)]

@@ -25,7 +25,8 @@ LEAST_SHARE = 0.02
 0.001."""
 LEAST_GROWTH = 1.3
 """A residual that changes by a smaller factor is as large everywhere. A judgement."""
-_IN_BAND = {"body bounce": "around body bounce", "wheel hop": "around wheel hop", "all": "in the whole band"}
+_IN_BAND = {**{name: f"around {name}" for name in ("body bounce", "wheel hop", "the natural frequency")},
+            "all": "in the whole band"}
 
 
 def in_band(name: str) -> str:

@@ -123,14 +123,15 @@ class ModelResiduals:
 
     @cached_property
     def bands(self) -> tuple[Band, ...]:
-        """Body and wheels of this car, about as wide as their damping makes them, and what lies below, between and
-        above, up to where the runs' pass bands end, half the sample rate if they do not."""
+        """Body and wheels of this car, or a mass alone, about as wide as their damping makes them, and what lies below,
+        between and above, up to where the runs' pass bands end, half the sample rate if they do not."""
         body_hz, wheels_hz = body_and_wheels_hz(structure_of(self.car.vehicle))
+        body = "body bounce" if len(wheels_hz) else "the natural frequency"
         top, own = self.top_hz, [] if len(body_hz) == 0 else [
-            ("below body bounce", body_hz[0] / 1.35), ("body bounce", body_hz[-1] * 1.35)]
+            (f"below {body}", body_hz[0] / 1.35), (body, body_hz[-1] * 1.35)]
         if len(wheels_hz):
             between = np.sqrt(body_hz[-1] * wheels_hz[0])
-            own = [own[0], ("body bounce", min(own[1][1], between)),
+            own = [own[0], (body, min(own[1][1], between)),
                    ("between bounce and hop", max(wheels_hz[0] / 1.3, between)), ("wheel hop", wheels_hz[-1] * 1.3)]
         last, above = own[-1] if own else ("any vibration", 0.0)
         kept = max(PASS_OF_RATE * self.rate_hz, above)
