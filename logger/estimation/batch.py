@@ -203,7 +203,8 @@ def local_level(iri_m_per_km: Array, window_m: float) -> Array:
     """Mean IRI (n,) of the known ones within ``LEVEL_REACH_M`` of each window; NaN where there is none."""
     reach = round(LEVEL_REACH_M / window_m)
     known = np.isfinite(iri_m_per_km)
-    sums, counts = (np.convolve(row, np.ones(2 * reach + 1))[reach: reach + len(row)]
+    around = np.ones(2 * reach + 1)
+    sums, counts = (np.convolve(row, around)[reach: reach + len(row)] if len(row) else row
                     for row in (np.where(known, iri_m_per_km, 0.0), known))
     return np.where(counts > 0, sums / np.maximum(counts, 1), np.nan)
 

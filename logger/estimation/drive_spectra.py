@@ -54,9 +54,9 @@ over each other by 1/6 (F. Harris, Proceedings of the IEEE 66, 1978)."""
 class DriveSpectra:
     """Blocks (b,) of one drive or several.
 
-    speed_mps    mean of each, with the same weights
-    spread       standard deviation of the speed in each as a share, the window's squares its weights: a steady rise has
-                 half of that of all samples alike
+    speed_mps    mean of each, the window's squares its weights
+    spread       standard deviation of the speed in each as a share, with the same weights: a steady rise has half of
+                 that of all samples alike
     power        (b, k) mean one-sided spectrum in each of ``bands`` [m2/s4 per Hz]; NaN: the recorder does not pass it
     noise        (b,) known part of the readings' noise, as a spectrum: its sensor's and its steps' [m2/s4 per Hz]; NaN:
                  not known

@@ -5,7 +5,7 @@ response of one resonance says nothing about another far from it. Solution: one 
 that on the springs squared and on the dampers, at the same masses (dimensional analysis). It is tried over all modes
 that the records can show, with a second factor on all dampers, and then one on each spring and damper; the fit begins
 where the response of the linear model is likest to the records, whatever their size. Where forces drove it and none of
-its masses is known either, the size is that of the records. What was only let go rings at its slowest mode.
+its masses is known either, the size is that of the records. What was only let go is taken to ring at its slowest mode.
 """
 
 from __future__ import annotations
@@ -55,7 +55,7 @@ def at_time_scale(vehicle: Vehicle, unknown: Collection[str], runs: Sequence[Run
 
     if rings_hz := ringing_hz(runs):
         return quickened(float(np.median(rings_hz)) / first_hz, min(_DAMPED))
-    records = [_Spectra.of(run.part(slice(round((run.skip_s + _PART_S) * run.rate_hz))), vehicle) for run in driven]
+    records = [_Spectra.of(run, vehicle) for run in driven]
     slowest_hz = _PERIODS / max(run.count / run.rate_hz for run in driven)
     quickest_hz = min(run.rate_hz for run in driven) / 2
     count = int(np.ceil(np.log(quickest_hz / slowest_hz) / np.log(_QUICKER))) + 1
@@ -66,6 +66,8 @@ def at_time_scale(vehicle: Vehicle, unknown: Collection[str], runs: Sequence[Run
         return sum(record.likeness(one) for record in records)
 
     best = max(cars, key=likeness)
+    if not likeness(best) > 0:
+        return vehicle
     shares = np.exp(np.arange(-_EACH, _EACH + 1) * 2 * np.log(_QUICKER))
     for name in [*springs, *dampers] * (_ROUNDS if len(springs) > 1 else 0):
         best = max((changed(best, {name: share * read(best, name)}) for share in shares), key=likeness)
@@ -91,7 +93,7 @@ def ringing_hz(runs: Sequence[Run]) -> list[float]:
 
 @dataclass(frozen=True, eq=False)
 class _Spectra:
-    """What drives a run, (f, u), and what it recorded, (f,), at frequencies [Hz]."""
+    """What drives a run, (f, u), and what it recorded, (f,), at frequencies [Hz], where it recorded most."""
 
     run: Run
     f_hz: Array
@@ -102,18 +104,22 @@ class _Spectra:
     def of(cls, run: Run, vehicle: Vehicle) -> _Spectra:
         passage = Passage(run.track, run.rate_hz, run.distance_m, run.rate_hz)
         inputs = passage.sampled(passage.under_wheels(structure_of(vehicle))[0])[run.first:]
-        taper = np.hanning(len(inputs))
-        spectra = np.fft.rfft(taper[:, None] * (inputs - inputs.mean(axis=0)), axis=0)
-        record = np.fft.rfft(taper * (run.kept_mps2 - run.kept_mps2.mean()))
+        read_ = run.kept_mps2 - run.kept_mps2.mean()
+        size = min(round(_PART_S * run.rate_hz), len(read_))
+        power = np.concatenate([[0.0], np.cumsum(read_**2)])
+        first = int(np.argmax(power[size:] - power[:-size]))
+        taper, part = np.hanning(size), slice(first, first + size)
+        spectra = np.fft.rfft(taper[:, None] * (inputs[part] - inputs[part].mean(axis=0)), axis=0)
+        record = np.fft.rfft(taper * (read_[part] - read_[part].mean()))
         f_hz = np.asarray(np.fft.rfftfreq(len(taper), 1 / run.rate_hz), float)
         return cls(run, f_hz[1:], spectra[1:], record[1:])
 
     def likeness(self, vehicle: Vehicle) -> float:
-        """Share of the power of the record that is the vehicle's motion, times any factor above 0."""
+        """Share of the power of the record that is the vehicle's motion, times any factor: a record may be upside down.
+        """
         model = self._model(vehicle)
-        alike = float(np.vdot(model, self.record).real)
         power = float(np.vdot(model, model).real * np.vdot(self.record, self.record).real)
-        return alike**2 / power if alike > 0 and power > 0 else 0.0
+        return float(np.vdot(model, self.record).real) ** 2 / power if power > 0 else 0.0
 
     def gain(self, vehicle: Vehicle) -> float:
         """How many times as large as the vehicle's motion the record is."""

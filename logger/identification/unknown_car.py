@@ -392,7 +392,7 @@ class UnknownCar:
         known = moments[2] - moments[1] ** 2 / moments[0]
         squares = ((car.roads.own * (known + self.road_precision[1])) ** 2 / known).sum()
         found = np.sqrt(max(squares - len(known), np.sqrt(2 * len(known))) / known.sum())
-        return min(float(found), WAVINESS_WITHIN)
+        return min(float(found), WAVINESS_WITHIN) if len(known) else WAVINESS_WITHIN
 
 
 def _hole_power(lengths: Array) -> Array:

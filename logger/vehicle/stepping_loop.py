@@ -7,8 +7,8 @@ these few numbers, and the state is taken on once. Matrices stand transposed and
 
 Problem: a force by whatever moves at a wheel, with states of its own (``MotionLaw``), fits in no table, and the loop is
 compiled before anybody wrote that law. Solution: each law is compiled by itself, once, to machine code with one and the
-same signature, kept on disk too; the loop knows it by its address. Without numba the address is a number in a list. A
-law's functions are distinguished by their code, so they get all that they need as ``p`` and hold nothing else. Their
+same signature, kept on disk too; the loop knows it by its address. Without numba the address is a number in a list.
+Functions of one code and the same constants beside it are one: what differs from car to car they get as ``p``. Their
 states are stepped by an exponential midpoint rule, each with its own decay, the motion at the mean of both ends of the
 step: exact for a state that decays towards something, however quickly (M. Hochbruck, A. Ostermann, Exponential
 integrators, Acta Numerica 19, 2010, 2.3).
@@ -56,10 +56,11 @@ _KEPT: list[Any] = []  # compiled functions, which live as long as their address
 def addresses_of(law: MotionLaw) -> list[int]:
     """How the loop knows a law's force, and its rates (0: none). ValueError as ``functions_of``, and for one that
     cannot be compiled."""
-    functions = functions_of(law)
-    _FUNCTIONS.update((one.__code__, one) for one in functions)
-    names, memory = tuple(sorted(vars(law.p))), len(law.memory)
-    return [*(_address(one.__code__, names, memory, one is law.rates) for one in functions), 0][:2]
+    names, memory, found = tuple(sorted(vars(law.p))), len(law.memory), []
+    for one in functions_of(law):
+        _FUNCTIONS[key := _identity(one)] = one
+        found.append(_address(key, names, memory, one is law.rates))
+    return [*found, 0][:2]
 
 
 def functions_of(law: MotionLaw) -> list[Any]:
@@ -77,17 +78,29 @@ def numbers_in_order(law: MotionLaw) -> list[float]:
     return [value for _, value in sorted(vars(law.p).items())]
 
 
-_FUNCTIONS: dict[CodeType, Any] = {}
+_Identity = tuple[CodeType, tuple[tuple[str, float], ...]]
+_FUNCTIONS: dict[_Identity, Any] = {}
+
+
+def _identity(function: FunctionType) -> _Identity:
+    """A function's code, and what that reads beside it: numbers by their value, other things by which they are."""
+    codes, read = [function.__code__], dict[str, float]()
+    for code in codes:
+        codes += [one for one in code.co_consts if isinstance(one, CodeType)]
+        for name in code.co_names:
+            if (one := function.__globals__.get(name)) is not None:
+                read[name] = one if isinstance(one, float | int) else id(one)
+    return function.__code__, tuple(read.items())
 
 
 @cache
-def _address(code: CodeType, names: tuple[str, ...], memory: int, rates: bool) -> int:
-    """Of a function with such code of a law with these numbers and states: of its rates, or of its force."""
+def _address(key: _Identity, names: tuple[str, ...], memory: int, rates: bool) -> int:
+    """Of a function of a law with these numbers and states: of its rates, or of its force."""
     numbers = namedtuple("numbers", names)  # type: ignore[misc]  # names are known only now
     if not COMPILED:
-        _KNOWN.append(_plain(_FUNCTIONS[code], numbers, memory, rates))
+        _KNOWN.append(_plain(_FUNCTIONS[key], numbers, memory, rates))
         return len(_KNOWN) - 1
-    compiled = _machine_code(_FUNCTIONS[code], numbers, memory, rates)
+    compiled = _machine_code(_FUNCTIONS[key], numbers, memory, rates)
     _KEPT.append(compiled)
     return int(compiled.address)
 
@@ -223,8 +236,17 @@ def ask(address: int, given: Array, first: int, felt: Array, answers: Array) -> 
     _call(address, given, first, felt, answers)
 
 
+def _njit(function: Any, **options: Any) -> Any:
+    """Machine code that is kept on disk, where there is a place for it."""
+    options |= {"nogil": True, "error_model": "numpy"}
+    try:
+        return numba.njit(cache=True, **options)(function)
+    except RuntimeError:  # Numba found none
+        return numba.njit(**options)(function)
+
+
 if COMPILED:
-    ask = numba.njit(cache=True, nogil=True, error_model="numpy", forceinline=True)(ask)
+    ask = _njit(ask, forceinline=True)
 
 
 Whole = npt.NDArray[np.int64]
@@ -238,12 +260,11 @@ places of the wheels (M, w) and the times (M,)."""
 def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     """What runs in the loop and makes no arrays: it need not count who holds which, which would take most of its time.
     """
-    lean: dict[str, Any] = {"cache": True, "nogil": True, "error_model": "numpy", "forceinline": True, "_nrt": False}
-    return numba.njit(**lean)(function) if COMPILED else function
+    return _njit(function, forceinline=True, _nrt=False) if COMPILED else function
 
 
 def _compiled_with_arrays(function: Callable[..., Any]) -> Callable[..., Any]:
-    return numba.njit(cache=True, nogil=True, error_model="numpy")(function) if COMPILED else function
+    return _njit(function) if COMPILED else function
 
 
 TRAVEL_M, RATE_MPS = 0.4, 8.0

@@ -367,14 +367,17 @@ def test_uneven_clocks_are_laid_on_even_times_and_nothing_is_compared_beyond_the
 
 
 def test_a_part_may_be_moved_by_its_velocity(tmp_path: Path) -> None:
-    """As a bench of dampers writes it, its sensor 3 mm/s off."""
-    w = 2 * np.pi * 20 / TIME_S[-1]
+    """As a bench of dampers writes it; it need not end where it began."""
+    w = 2 * np.pi * 20.25 / TIME_S[-1]
     velocity_mps, way_m = 0.4 * np.cos(w * TIME_S), 0.4 / w * np.sin(w * TIME_S)
-    run = written(tmp_path / "run", {"force_n": 2e4 * way_m + 900 * velocity_mps},
-                  {"velocity_mps": velocity_mps + 3e-3}, "source: me\n")
+    force = {"force_n": 2e4 * way_m + 900 * velocity_mps}
+    run = written(tmp_path / "run", force, {"velocity_mps": velocity_mps}, "source: me\n")
     (part := tmp_path / "part.yaml").write_text("name: part\nmodel: component\nstiffness_n_per_m: 2e4\n"
                                                 "damping_n_s_per_m: 900\n")
     assert ridelog.compare(part, run).error < 1e-3
+    off = written(tmp_path / "off", force, {"velocity_mps": velocity_mps + 0.01}, "source: me\n")
+    with pytest.raises(BadInput, match=r"found a drift by 0.158 m beside a stroke of 0.112 m: give "):
+        ridelog.compare(part, off)
     np.savetxt(run / "excitation.csv", np.stack([TIME_S, velocity_mps, way_m], axis=1), "%.9g", ",",
                header="t_s,velocity_mps,force_n", comments="")
     with pytest.raises(BadInput, match=r"a part that is moved \(displacement_m or velocity_mps\) or forces on it, "):
@@ -1038,6 +1041,28 @@ def test_modes_far_from_those_of_a_car_are_found(bench: Bench, signal: str, mass
     true["front.tire_stiffness_n_per_m"] = bench.tire
     for name, value in found["parameters"].items():
         assert value == pytest.approx(true[name], abs=4 * found["standard_errors"][name])
+
+
+@pytest.mark.parametrize(("rests", "lasts", "sign"), [(7500, 2000, 1), (0, 800, 1), (0, 2000, -1)],
+                         ids=["after-a-rest", "short", "upside-down"])
+def test_modes_are_found_wherever_they_are_in_a_record(rests: int, lasts: int, sign: int, tmp_path: Path,
+                                                       capsys: pytest.CaptureFixture[str]) -> None:
+    """Of 36 Hz; a record that is upside down is called so."""
+    bench, push = Bench(2.0, 1e5, 60.0), noise(40.0, 2.0, 7)
+    seen = sign * bench.moved(NOTHING, push, NOTHING)["accel_z_mps2"][:lasts]
+    (run := tmp_path / "run").mkdir()
+    for name, column, samples in (("drive", "accel_z_mps2", seen), ("excitation", "force_n", push(TIME_S[:lasts]))):
+        whole = np.concatenate([np.random.default_rng(1).normal(0.0, 1e-3 * samples.std(), rests), samples])
+        np.savetxt(run / f"{name}.csv", np.stack([np.arange(len(whole)) / RATE_HZ, whole], axis=1), "%.9g", ",",
+                   header=f"t_s,{column}", comments="")
+    (run / "run.yaml").write_text(BODY)
+    (rig := tmp_path / "rig.yaml").write_text("name: rig\nmodel: single_mass\nmass_kg: 2 +- 1%\n"
+                                              "stiffness_n_per_m: unknown\ndamping_n_s_per_m: unknown\n")
+    if sign < 0:
+        with pytest.raises(BadInput, match="expected it to follow force_n, found the opposite sign"):
+            ridelog.identify(rig, run)
+        return
+    assert identified(capsys, rig, run)["parameters"]["stiffness_n_per_m"] == pytest.approx(1e5, rel=0.03)
 
 
 @pytest.mark.slow

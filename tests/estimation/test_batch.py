@@ -100,3 +100,4 @@ def test_level_around_a_window_by_hand() -> None:
     iri = np.array([1.0, 2.0, float("nan"), 4.0, 5.0, 6.0])
     assert local_level(iri, 50.0) == pytest.approx([1.5, 1.5, 3.0, 4.5, 5.0, 5.5])
     assert local_level(iri, 200.0) == pytest.approx(iri, nan_ok=True)
+    assert len(local_level(np.empty(0), 7.62)) == 0

@@ -355,6 +355,16 @@ def test_machine_code_is_kept_of_the_law_that_was_meant(tmp_path: Path, monkeypa
     assert [answer(of_array) for _ in range(2)] == [(20.0, 0)] * 2  # what it holds is not said by its text
 
 
+def test_laws_that_differ_in_a_constant_alone_are_two(tmp_path: Path, plain: np.ndarray) -> None:
+    def largest_n(slip_mps: float) -> float:
+        functions = (f"SLIP_MPS = {slip_mps}\n"
+                     "def rubs(p, seen):\n    return p.size * np.tanh(seen.rate_mps / SLIP_MPS)\n")
+        return float(np.abs(stepped(own(tmp_path, functions, "Between.BODY_AND_WHEEL, rubs, p", 20.0))[1]).max())
+
+    assert largest_n(0.001) == pytest.approx(20.0, rel=1e-3)
+    assert largest_n(10.0) < 2.0
+
+
 # --- in place of them, linear ones ---
 
 

@@ -368,7 +368,7 @@ def placed(model: CarModel, drives: Sequence[Drive]) -> CarModel:
         check_readings(one, drives[:number])
         check_forces(model.vehicle, one.track, str(one.path / RUN))
         check_channels(one, model.vehicle)
-    runs = [run for one in drives for run in driven_stretches(one)]
+    runs = [run for one in drives for run in driven_stretches(one, past_of(one.track).value)]
     vehicle = at_time_scale(model.vehicle, unknown, runs)
     return replace(model, vehicle=vehicle, known={**model.known, **{
         name: replace(model.known[name], value=read_number(vehicle, name)) for name in unknown}})
@@ -393,7 +393,7 @@ def checked_runs(drives: Sequence[Drive], thin: bool = True, vehicle: Vehicle | 
         if vehicle is not None:
             check_forces(vehicle, drive.track, str(drive.path / RUN))
             check_channels(drive, vehicle)
-    runs = [run for one in drives for run in driven_stretches(one, vehicle)]
+    runs = [run for one in drives for run in driven_stretches(one, least_s(one, vehicle))]
     if vehicle is not None and moves_freely(vehicle):
         runs = [of_rates(run) for run in runs]
     kept = thinned_runs(runs, vehicle) if thin else runs
@@ -451,7 +451,7 @@ def check_distances(drive: Drive) -> None:
                        f"from the speed and {way_m:.4g} m from the distance ({likely_unit(by_speed_m, way_m)})")
 
 
-def driven_stretches(drive: Drive, vehicle: Vehicle | None = None) -> list[Run]:
+def driven_stretches(drive: Drive, shortest_s: float = LEAST_S) -> list[Run]:
     """The parts of a drive in which the car moved, or it is known what drove the rig, and there were readings
     (``driven_parts``), each a run. A part says in its name which seconds it is of. BadInput as ``driven_parts``."""
     driven = None
@@ -459,7 +459,7 @@ def driven_stretches(drive: Drive, vehicle: Vehicle | None = None) -> list[Run]:
     if isinstance(drive.track, Excitation):
         near_s, time_s = 0.5 / drive.rate_hz, drive.time_s - drive.time_s[0]
         driven = (time_s > drive.track.start_s - near_s) & (time_s < drive.track.end_s + near_s)
-    parts = driven_parts(drive, driven, vehicle)
+    parts = driven_parts(drive, driven, shortest_s)
     whole = len(parts) == 1 and parts[0] == slice(0, len(drive.time_s))
     cut = LeftOut((len(drive.time_s) - sum(part.stop - part.start for part in parts)) / drive.rate_hz, "s",
                   "without excitation or readings")
@@ -552,13 +552,13 @@ def check_channels(drive: Drive, vehicle: Vehicle) -> None:
                        "sign: change the sign of one of them (both are positive up)")
 
 
-def driven_parts(drive: Drive, on_rig: Bools | None = None, vehicle: Vehicle | None = None) -> list[slice]:
+def driven_parts(drive: Drive, on_rig: Bools | None = None, shortest_s: float = LEAST_S) -> list[slice]:
     """Where in a drive the car moved, or was driven ``on_rig`` (n,), and there were readings.
 
     A gap between readings is left in a part, as samples that nobody read: a cut there would lose the next ``SKIP_S`` as
     well. One that lasts longer than that is cut out, and so are those at the ends of a part.
 
-    Raises BadInput where no part has readings for ``least_s``.
+    Raises BadInput where no part has readings for so long (``least_s``).
     """
     driven = drive.speed_mps >= SLOWEST_MPS if on_rig is None else on_rig
     read = driven if drive.usable is None else driven & (drive.usable != NO_READING)
@@ -566,7 +566,6 @@ def driven_parts(drive: Drive, on_rig: Bools | None = None, vehicle: Vehicle | N
     for gap in map(slice, *stretches_of(driven & ~read)):
         between = gap.start > 0 and gap.stop < len(read) and read[gap.start - 1] and read[gap.stop]
         kept[gap] = between and gap.stop - gap.start <= SKIP_S * drive.rate_hz
-    shortest_s = least_s(drive, vehicle)
     parts = [part for part in map(slice, *stretches_of(kept))
              if np.count_nonzero(read[part]) >= shortest_s * drive.rate_hz]
     if not parts:

@@ -184,7 +184,7 @@ class PlanQuestion(LabQuestion):
     add most.
 
     Each RUN is a folder as in 'ridelog compare'. Planned drives cover a whole profile, one at each speed, with 100
-    samples a second and for 5 s or longer (on quick rigs less).
+    samples a second and for 5 s or longer.
 
       ridelog plan --vehicle mycar.yaml --profile road.csv --speed 8 --speed 15
       ridelog plan --vehicle mycar.yaml run1 run2 --out plan.html

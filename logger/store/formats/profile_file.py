@@ -468,13 +468,13 @@ _OTHER_UNIT = re.compile("(force|elevation|displacement)(_[a-z0-9]+)*?_(kn|mn|lb
 def read_excitation(path: Path | str, forces: Sequence[AppliedForce] = ()) -> Excitation:
     """Read CSV ``t_s`` with ``elevation_m[,elevation_rear_m]``, forces (``force_n``, ``force_NAME_n``), or both; or
     of a part alone ``displacement_m`` or ``velocity_mps``. It begins at the file's own time, and has even ones
-    (``laid_evenly``). A velocity beside a displacement is not read; one alone is integrated, an offset of its sensor
-    taken out by bringing the part back at the end.
+    (``laid_evenly``). A velocity beside a displacement is not read; one alone is integrated.
 
     forces    what each of its forces acts on
 
     Raises BadInput ("file:line: expected ..., found ...") for anything else, for times that are not even, for
-    elevations and forces that no rig has, and for forces of which is not said what they act on.
+    elevations and forces that no rig has, for forces of which is not said what they act on, and for a velocity alone
+    whose zero seems off, as its integral drifts by more than it swings.
     """
     fewest = 4
     known = {one.name: one for one in forces}
@@ -501,11 +501,20 @@ def read_excitation(path: Path | str, forces: Sequence[AppliedForce] = ()) -> Ex
         even_rate_hz(table[:, 0], file)
     moved = laid[:, :len(heights)] if heights else np.zeros((len(laid), 1))
     if heights == PART_COLUMNS[2:]:
-        way = _integral(moved) / rate_hz
-        moved = way - np.linspace(0.0, way[-1], len(way))
+        moved = _integral(moved) / rate_hz
+        _check_stroke(moved, file)
     return Excitation(rate_hz, moved if len(heights) > 1 else moved[:, 0].copy(), float(table[0, 0]),
                       laid[:, len(heights):] if pushes else None, tuple(known[name] for name in pushes),
                       moves_part)
+
+
+def _check_stroke(way_m: Array, file: str) -> None:
+    drift_m = float(way_m[-1, 0])
+    swing_m = float(np.ptp(way_m[:, 0] - np.linspace(0.0, drift_m, len(way_m))))
+    if abs(drift_m) > swing_m:
+        raise BadInput(f"{file}: expected velocities of a part that stays on its bench, found a drift by "
+                       f"{drift_m:.3g} m beside a stroke of {swing_m:.3g} m: give {PART_COLUMNS[1]}, or take the zero "
+                       f"of {PART_COLUMNS[2]} off")
 
 
 def _integral(samples: Array) -> Array:
