@@ -405,7 +405,7 @@ class FollowedRoad:
     def _believe(self, log_evidence: Array) -> None:
         assert self._learner is not None
         self._unscored = 0
-        self._learner.take(log_evidence, is_by_belief=self._is_coarse)
+        self._learner.take(log_evidence)
         self._take_over()
 
     def level_at(self, first: int, count: int) -> tuple[RoadSpectrum, float]:

@@ -41,9 +41,6 @@ UNKNOWN_LOG_STD = 1.0
 # are within one and two such errors. Powers of 1.5, 2, 2.5 and 3 are each less likely than 1.
 _MODEL_LOG_STD, _ROUGH_LOG_STD = 0.04, 0.014
 _WANDERED_LOG_STD = 0.05  # from drive to drive: temperature, supply
-# Stretches that were solved with another noise than is believed now mislead: by the square of a move so much of what
-# they said goes. First drives, noise 0.49 m/s2 at 8 g begun with 0.2: R2 0.60, 0.64, 0.70, 0.72 for 0, 10, 40, 100.
-_FORGOTTEN_PER_LOG_2 = 100.0
 _LEAST_SHARE = 0.05
 _EXPECTED_STRETCHES = 4.0  # count as having scattered as they should
 _SPACING, _REACH = 0.1, 35  # of the grid in the log noise: a factor of 33 up and down
@@ -125,8 +122,8 @@ class NoiseLearner:
     """Follows the noise from stretch to stretch, from what was believed before.
 
     usual        of such a sensor: to this a belief returns from drive to drive where nothing more is heard (stabilised
-                 forgetting; Kulhavy and Zarrop, International Journal of Control 58, 1993). Within a drive only what
-                 was judged by another noise is forgotten, for a noise is a constant of the sensor
+                 forgetting; Kulhavy and Zarrop, International Journal of Control 58, 1993). Within a drive nothing is
+                 forgotten: a noise is a constant of the sensor
     step_mps2    readings are bounds this wide [m/s2]; 0: they are not
 
     ``log_noise`` (g,) are the noises that stretches are to be judged by: logarithms of m/s2; ``stretches`` is how many
@@ -148,33 +145,26 @@ class NoiseLearner:
         self.stretches = 0
         self._mean, self._std = before.log_mean, before.log_std
 
-    def take(self, log_evidence: Array, is_by_belief: bool = False) -> None:
+    def take(self, log_evidence: Array) -> None:
         """One more stretch, which shares no reading with those before it: how probable it is for each of
-        ``log_noise`` (g,), as a logarithm and up to a constant; ``is_by_belief`` if that is right only near what was
-        believed when it was solved."""
+        ``log_noise`` (g,), as a logarithm and up to a constant."""
         slopes = np.gradient(log_evidence, _SPACING)
         self._evidence = self._evidence + log_evidence
         self._slopes = self._slopes + slopes
         self._squares = self._squares + slopes**2
         self._heard += 1
         self.stretches += 1
-        before = self._mean
         at, _ = self._moments(1.0)
         self._mean, self._std = self._moments(self._excess(at))
-        if is_by_belief:
-            self._keep(exp(-_FORGOTTEN_PER_LOG_2 * (self._mean - before) ** 2))
 
     def next_drive(self) -> None:
         """Another drive begins: the noise may have wandered, as in ``NoiseBelief.next_drive``."""
         kept = self._std**2 / (self._std**2 + _WANDERED_LOG_STD**2)
         self._prior = kept * self._prior + (1 - kept) * self._usual
-        self._keep(kept)
-        self._std = min(hypot(self._std, _WANDERED_LOG_STD), UNKNOWN_LOG_STD)
-
-    def _keep(self, share: float) -> None:
         self._evidence, self._slopes, self._squares = (
-            share * row for row in (self._evidence, self._slopes, self._squares))
-        self._heard *= share
+            kept * row for row in (self._evidence, self._slopes, self._squares))
+        self._heard *= kept
+        self._std = min(hypot(self._std, _WANDERED_LOG_STD), UNKNOWN_LOG_STD)
 
     def _excess(self, log_noise: float) -> float:
         """How much more the slopes of the stretches scatter at a noise than the bend of their evidence says that they

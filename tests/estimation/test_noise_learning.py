@@ -205,16 +205,6 @@ def test_a_drive_s_first_stretches_count_as_its_last() -> None:
     assert ahead.belief.log_std == pytest.approx(back.belief.log_std, rel=1e-9)
 
 
-def test_what_was_judged_by_another_noise_is_forgotten() -> None:
-    exact, by_belief = (NoiseLearner(USUAL, USUAL, STEP) for _ in range(2))
-    for said, count in ((0.02, 6), (0.1, 12)):
-        for _ in range(count):
-            for learner in (exact, by_belief):
-                learner.take(-10 * (learner.log_noise - np.log(said)) ** 2, is_by_belief=learner is by_belief)
-    assert by_belief.belief.noise_rms_mps2 == pytest.approx(0.1, rel=0.1)
-    assert exact.belief.noise_rms_mps2 < 0.07
-
-
 def test_stretches_that_disagree_more_than_they_should_make_it_less_certain() -> None:
     calm, wild = (NoiseLearner(USUAL, USUAL, 0.0) for _ in range(2))
     for number in range(60):
