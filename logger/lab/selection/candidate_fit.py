@@ -13,6 +13,7 @@ import numpy as np
 from logger.lab.likelihood.by_squares import BySquares
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import MapFit, fit, optimise_numbers, relinearise
+from logger.lab.likelihood.noise_floor import gain_of_full_explanation
 from logger.lab.likelihood.posterior import NotSimulated, State
 from logger.lab.selection.evidence import (
     INDISTINGUISHABLE,
@@ -20,7 +21,7 @@ from logger.lab.selection.evidence import (
     probability_by_chance,
     probability_of_likelihood_gain,
 )
-from logger.lab.selection.holdout import HoldOut, cross_validate
+from logger.lab.selection.holdout import HoldOut, cross_validate, most_of
 from logger.lab.selection.screening import Baseline, Screened, Trial
 from logger.vehicle.effect import AXLE, Chosen, Effect, Sought
 from logger.vehicle.named_parameters import free_parameters_of
@@ -132,8 +133,12 @@ def with_refinements(now: Baseline, name: str, least: float) -> Baseline:
 
 
 def _explains_most(more: CandidateFit, less: CandidateFit) -> bool:
-    """Whether one fit explains most of what another leaves."""
-    return more.gain > less.gain + INDISTINGUISHABLE and more.hold_out.explains_most_beyond(less.hold_out)
+    """Whether one fit explains most of what another leaves: of its power on stretches held out, or of its evidence in
+    all signals, as the power of the first is mostly noise where it leaves little."""
+    gain = more.gain - less.gain
+    return gain > INDISTINGUISHABLE and (
+        more.hold_out.explains_most_beyond(less.hold_out)
+        or gain > most_of(gain_of_full_explanation(less.found.posterior, less.found.state)))
 
 
 def _rough_fit(score: float, base: Baseline, trial: Trial) -> CandidateFit:
