@@ -27,7 +27,7 @@ def rates(p: Any, seen: Seen) -> tuple[Any]:
 class MaxwellElement(ForceEffect):
     title = "Maxwell element: rubber that creeps"
     parameters = (
-        Parameter("maxwell_stiffness_n_per_m", 1e4, 0.0, 1e7, 0.0, Scale.LINEAR, (1e4,),
+        Parameter("maxwell_stiffness_n_per_m", 1e4, 0.0, 1e6, 0.0, Scale.LINEAR, (1e4,),
                   "of its spring, beside the suspension's own"),
         Parameter("relaxation_time_s", 0.1, 0.005, 5.0, None, Scale.LOG, (0.02, 0.07, 0.25),
                   "in which its force falls to 37 %"),
