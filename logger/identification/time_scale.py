@@ -65,9 +65,10 @@ def at_time_scale(vehicle: Vehicle, unknown: Collection[str], runs: Sequence[Run
     def likeness(one: Vehicle) -> float:
         return sum(record.likeness(one) for record in records)
 
-    best = max(cars, key=likeness)
-    if not likeness(best) > 0:
+    likenesses = [*map(likeness, cars)]
+    if not max(likenesses) > 0:
         return vehicle
+    best = cars[int(np.argmax(likenesses))]
     shares = np.exp(np.arange(-_EACH, _EACH + 1) * 2 * np.log(_QUICKER))
     for name in [*springs, *dampers] * (_ROUNDS if len(springs) > 1 else 0):
         best = max((changed(best, {name: share * read(best, name)}) for share in shares), key=likeness)

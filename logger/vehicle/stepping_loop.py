@@ -82,15 +82,26 @@ _Identity = tuple[CodeType, tuple[tuple[str, float], ...]]
 _FUNCTIONS: dict[_Identity, Any] = {}
 
 
+@cache
+def _codes_and_globals(code: CodeType) -> tuple[list[CodeType], list[str]]:
+    """The code with that of all functions in it, and names that they read of their module."""
+    codes = [code]
+    for each in codes:
+        codes += [one for one in each.co_consts if isinstance(one, CodeType)]
+    asked = (one for each in codes for one in get_instructions(each) if one.opname == "LOAD_GLOBAL")
+    return codes, sorted({one.argval for one in asked})
+
+
+def _read_beside(function: FunctionType) -> dict[str, Any]:
+    """What a function reads of its module, by name."""
+    _, names = _codes_and_globals(function.__code__)
+    return {name: function.__globals__[name] for name in names if name in function.__globals__}
+
+
 def _identity(function: FunctionType) -> _Identity:
     """A function's code, and what that reads beside it: numbers by their value, other things by which they are."""
-    codes, read = [function.__code__], dict[str, float]()
-    for code in codes:
-        codes += [one for one in code.co_consts if isinstance(one, CodeType)]
-        for name in code.co_names:
-            if (one := function.__globals__.get(name)) is not None:
-                read[name] = one if isinstance(one, float | int) else id(one)
-    return function.__code__, tuple(read.items())
+    return function.__code__, tuple((name, one if isinstance(one, float | int) else id(one))
+                                    for name, one in _read_beside(function).items())
 
 
 @cache
@@ -165,16 +176,12 @@ def _machine_code(function: Any, numbers: Any, memory: int, rates: bool = False)
 
 def all_said(function: FunctionType) -> str | None:
     """All that decides what a function does, where that is its own code, plain numbers and functions of NumPy."""
-    codes, said = [function.__code__], []
-    for code in codes:
-        codes += [one for one in code.co_consts if isinstance(one, CodeType)]
-        constants = [one for one in code.co_consts if not isinstance(one, CodeType)]
-        asked = {one.argval for one in get_instructions(code) if one.opname == "LOAD_GLOBAL"}
-        named = {name: function.__globals__[name] for name in sorted(asked & function.__globals__.keys())}
-        if not all(isinstance(one, float | int) or one is np or one is math for one in named.values()):
-            return None
-        said.append((code.co_code, constants, code.co_names, code.co_varnames, named))
-    return repr(said)
+    codes, _ = _codes_and_globals(function.__code__)
+    beside = _read_beside(function)
+    if not all(isinstance(one, float | int) or one is np or one is math for one in beside.values()):
+        return None
+    return repr((beside, [(code.co_code, [one for one in code.co_consts if not isinstance(one, CodeType)],
+                          code.co_names, code.co_varnames) for code in codes]))
 
 
 if COMPILED:

@@ -23,7 +23,7 @@ from logger.api.lab.checks import (
     check_roads,
     moves_freely,
     of_rates,
-    placed,
+    with_initial_values,
 )
 from logger.api.shared_fields import each, paths_of
 from logger.api.shown import CommandResult
@@ -151,7 +151,7 @@ def identify(question: IdentifyQuestion) -> Identification:
     flat_will_do = bool(question.obstacles) or question.road != MEASURED
     drives = [run_on_road(one, question.warn) if not flat_will_do else one if isinstance(one, Run) else read_run(one)
               for one in given]
-    model = model_of(placed(model_of(question.vehicle), drives))
+    model = model_of(with_initial_values(model_of(question.vehicle), drives))
     records = _records(drives, question, model.vehicle)
     if question.free is None and (question.road != MEASURED or question.obstacles):
         raise question.wrong("free", ": expected the parameters to fit, as the road was not measured")

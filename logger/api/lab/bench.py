@@ -17,7 +17,7 @@ import numpy as np
 
 from logger.api.drives import Run as DrivenRun
 from logger.api.drives import run_on_road
-from logger.api.lab.checks import check_model, check_moves, checked_runs, placed, predicted
+from logger.api.lab.checks import check_model, check_moves, checked_runs, predicted, with_initial_values
 from logger.api.lab.question import LabQuestion
 from logger.api.shared_fields import Runs, each
 from logger.api.vehicles import model_of
@@ -396,7 +396,7 @@ def bench_with(question: LabQuestion, searches: str | None = None, thin: bool = 
     """Vehicle, runs and effects of a question, checked together."""
     given: Any = question
     drives = lab_drives(given.runs, question.warn)
-    model = placed(model_of(given.vehicle), drives)
+    model = with_initial_values(model_of(given.vehicle), drives)
     off = tolerance_of(question.tolerance, model.known)
     runs = checked_runs(drives, thin, model.vehicle)
     return bench_of(word_of(given.vehicle, model), model, runs, list(map(str, getattr(question, "effect_files", ()))),

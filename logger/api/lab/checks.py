@@ -27,6 +27,7 @@ from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.whittle import BLOCK_S, HIGHEST_OF_RATE
 from logger.lab.residuals.breakdown import ModelResiduals
 from logger.lab.residuals.road_coherence import chance_of_following
+from logger.lab.residuals.statistics import rank_correlation
 from logger.lab.road_match import (
     RoadMatch,
     below_bounce_band_hz,
@@ -356,16 +357,15 @@ _RUN_CHECKS_LEAST_MPS2 = 1e-5  # no sensor is so quiet
 _DISAGREE, _DISAGREE_M = 0.5, 5.0
 
 
-def placed(model: CarModel, drives: Sequence[Drive]) -> CarModel:
+def with_initial_values(model: CarModel, drives: Sequence[Drive]) -> CarModel:
     """The model with what its file calls unknown of a rig where a fit to these drives begins (``at_time_scale``); what
-    was fitted once stays. BadInput as ``check_readings``."""
+    was fitted once stays. BadInput as ``check_forces`` and ``check_channels``."""
     unknown = [name for name, one in model.known.items() if one.words == UNKNOWN]
     if not unknown or model.given is not None:
         return model
-    for number, one in enumerate(drives):
+    for one in drives:
         if one.track is None or not one.track.timed:
             return model
-        check_readings(one, drives[:number])
         check_forces(model.vehicle, one.track, str(one.path / RUN))
         check_channels(one, model.vehicle)
     runs = [run for one in drives for run in driven_stretches(one, past_of(one.track).value)]
@@ -505,13 +505,12 @@ def check_decay(drive: Drive) -> None:
 def _swings_shrink(samples: Array) -> bool:
     """Whether the swings, from one peak between zero crossings to the next, fall with time, by C. Spearman's rank
     correlation (American Journal of Psychology 15, 1904)."""
-    from scipy.stats import spearmanr
-
     around = samples - samples.mean()
     starts = np.flatnonzero(np.diff(np.signbit(around), prepend=around[0] < 0))
     peaks = np.maximum.reduceat(np.abs(around), starts)[:-1] if len(starts) else np.empty(0)
     swings = peaks[:-1] + peaks[1:]
-    return len(swings) > 2 and bool(spearmanr(np.arange(len(swings)), swings, alternative="less").pvalue < _BY_CHANCE)
+    found, p_value = rank_correlation(np.arange(float(len(swings))), swings, fewest=3)
+    return found < 0 and p_value / 2 < _BY_CHANCE
 
 
 _ORDERS = {"displacement": 0, "travel": 0, "velocity": 1, "acceleration": 2}

@@ -32,12 +32,12 @@ def mean_of_blocks(signals: Sequence[Array], residuals: ModelResiduals) -> tuple
     return mean, error, float(2 * stdtr(len(means) - 1, -abs(mean) / error)) if error > 0 else np.nan
 
 
-def rank_correlation(one: Array, other: Array) -> tuple[float, float]:
-    """Spearman's rank correlation of (n,) with (n,) and its p-value; NaN for fewer than eight or where nothing varies.
-    """
+def rank_correlation(one: Array, other: Array, *, fewest: int = 8) -> tuple[float, float]:
+    """Spearman's rank correlation of (n,) with (n,) and its two-sided p-value; NaN for less than the ``fewest``, which
+    are three or more, or where nothing varies."""
     from scipy.special import stdtr
 
-    if len(one) < 8 or not (np.ptp(one) > 0 and np.ptp(other) > 0):
+    if len(one) < fewest or not (np.ptp(one) > 0 and np.ptp(other) > 0):
         return np.nan, np.nan
     places = [np.unique(each, return_inverse=True, return_counts=True) for each in (one, other)]
     ranks = [(np.cumsum(counts) - 0.5 * counts)[place] for _, place, counts in places]  # of equals their mean

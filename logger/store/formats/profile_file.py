@@ -501,27 +501,25 @@ def read_excitation(path: Path | str, forces: Sequence[AppliedForce] = ()) -> Ex
         even_rate_hz(table[:, 0], file)
     moved = laid[:, :len(heights)] if heights else np.zeros((len(laid), 1))
     if heights == PART_COLUMNS[2:]:
-        moved = _integral(moved) / rate_hz
-        _check_stroke(moved, file)
+        moved = _way_of(moved, rate_hz, file)
     return Excitation(rate_hz, moved if len(heights) > 1 else moved[:, 0].copy(), float(table[0, 0]),
                       laid[:, len(heights):] if pushes else None, tuple(known[name] for name in pushes),
                       moves_part)
 
 
-def _check_stroke(way_m: Array, file: str) -> None:
+def _way_of(velocity_mps: Array, rate_hz: float, file: str) -> Array:
+    """The displacement (n, 1) from the first sample on. BadInput as ``read_excitation``."""
+    from scipy.interpolate import CubicSpline
+
+    time_s = np.arange(len(velocity_mps)) / rate_hz
+    way_m = np.asarray(CubicSpline(time_s, velocity_mps).antiderivative()(time_s))
     drift_m = float(way_m[-1, 0])
     swing_m = float(np.ptp(way_m[:, 0] - np.linspace(0.0, drift_m, len(way_m))))
     if abs(drift_m) > swing_m:
         raise BadInput(f"{file}: expected velocities of a part that stays on its bench, found a drift by "
                        f"{drift_m:.3g} m beside a stroke of {swing_m:.3g} m: give {PART_COLUMNS[1]}, or take the zero "
                        f"of {PART_COLUMNS[2]} off")
-
-
-def _integral(samples: Array) -> Array:
-    """Of samples (n, c) from the first one on, in steps: by the cubic through the four samples around each step."""
-    around = np.concatenate([2 * samples[:1] - samples[1:2], samples, 2 * samples[-1:] - samples[-2:-1]])
-    steps = (13 * (around[1:-2] + around[2:-1]) - around[:-3] - around[3:]) / 24
-    return np.concatenate([np.zeros_like(samples[:1]), np.cumsum(steps, axis=0)])
+    return way_m
 
 
 def _driving(names: tuple[str, ...], file: str) -> tuple[str, ...] | None:
