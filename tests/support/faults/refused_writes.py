@@ -25,6 +25,9 @@ from .disk_models import RefusingFiles
 ERRORS = (errno.ENOSPC, errno.EIO, errno.EDQUOT, errno.EROFS)
 OLDER = b"\n# older\n"
 """What is appended to the files of a run before, so that they are not what is written again."""
+HEAVY = {".png": "matplotlib.figure", ".pdf": "matplotlib.figure", ".parquet": "pyarrow.parquet",
+         "fleet": "pyarrow.parquet", ".gpkg": "pyogrio"}
+"""What words of a command line load late, each a second or so."""
 ROOT = Path(__file__).parents[3]
 Content = dict[str, bytes | None]
 
@@ -126,8 +129,9 @@ class Trials(RefusingFiles):
 
 
 def _main(place: Path, words: list[str]) -> NoReturn:
-    for heavy in ("matplotlib.figure", "pyarrow.parquet", "pyogrio"):
-        importlib.import_module(heavy)  # once, not in each trial
+    for ending, heavy in HEAVY.items():  # once, not in each trial
+        if any(ending in word for word in words):
+            importlib.import_module(heavy)
     from logger import files
     from logger.commands import main
     from logger.fleet import dataset
