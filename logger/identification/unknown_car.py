@@ -215,10 +215,15 @@ class UnknownCar:
         few_mps = np.geomspace(low, high, 2 + int(np.log(high / low) / _SPEEDS_APART)) if high > low else self.speed_mps
         self._between = np.array([np.interp(self.speed_mps, few_mps, one) for one in np.eye(len(few_mps))]).T
         self._road_of_few = lru_cache(2)(partial(road_under, grid_hz() / few_mps[:, None], few_mps))
+        self._gains = lru_cache(1)(self._gains_of)  # roads, blocks and a step ask in turn for those of one car
 
     def gains(self, x: Array) -> Array:
         """Expected power of each band (s, k) per level Gd(0.2 cycle/m) of a road of waviness 2, at the drives' speeds.
         """
+        return self._gains(tuple(x))
+
+    def _gains_of(self, coordinates: tuple[float, ...]) -> Array:
+        x = np.array(coordinates)
         car = LinearCar.of(self.knowledge.car(x, 1.0, ""))
         at: Complex = np.asarray(2j * np.pi * grid_hz())
         structure, output = car.structure, car.output
@@ -231,12 +236,12 @@ class UnknownCar:
         of_sizes = sizes(_products(rates) * self._road_of_few(structure.contact_patch_m))
         even, odd = self._interference(float(structure.behind_m.max()))
 
-        def of_both(front: Complex, rear: Complex, across: Complex) -> Array:
-            return np.asarray(front.real + rear.real + even * across.real - odd * across.imag)
+        def parts(front: Complex, rear: Complex, across: Complex) -> Array:
+            return np.stack([front.real + rear.real, across.real, across.imag])
 
-        power = self._road_under(structure.contact_patch_m) * of_both(*_products(read[:wheels]))
-        power += of_both(*self._between @ (_products(read[wheels:]) * of_sizes))
-        return np.asarray(power @ expected().T)
+        own, real, imaginary = (self._road_under(structure.contact_patch_m) * parts(*_products(read[:wheels]))
+                                + self._between @ parts(*_products(read[wheels:]) * of_sizes))
+        return np.asarray((own + even * real - odd * imaginary) @ expected().T)
 
     def expected_power(self, x: Array, roads: BlockRoads) -> tuple[Array, Array]:
         """Of the road and of the noise, (b, k) and (b, 1)."""
