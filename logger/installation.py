@@ -32,6 +32,7 @@ FILES = {
     CONFIG: "config/ridelog.yaml",
     "etc/systemd/system/ridelog.service": "systemd/ridelog.service",
     "etc/systemd/system/ridelog-export@.service": "systemd/ridelog-export@.service",
+    "etc/systemd/system/ridelog-car.service": "systemd/ridelog-car.service",
     "etc/udev/rules.d/90-ridelog.rules": "systemd/90-ridelog.rules",
 }
 ENABLED = "etc/systemd/system/multi-user.target.wants/ridelog.service"
@@ -162,7 +163,8 @@ class Installation:
         """systemctl fails for a unit that it does not know: then there is nothing to stop."""
         unit = self._place("etc/systemd/system/ridelog.service")
         if unit.exists():
-            return self._command("systemctl", "stop", "ridelog.service", "ridelog-export@*.service")
+            return self._command("systemctl", "stop", "ridelog.service", "ridelog-export@*.service",
+                                 "ridelog-car.service")
         return InstallationStep(f"nothing to stop: no {unit}")
 
     def _put_record(self, digests: dict[str, str]) -> InstallationStep:

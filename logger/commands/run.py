@@ -2,14 +2,17 @@
 
 import logging
 import os
+import subprocess
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated
 
 from logger.errors import RidelogError
 from logger.question import Checked, Option, Question, Verb
-from logger.service.config import find_config, load_config
+from logger.service.config import find_config, learned_cars, learns_car, load_config
 from logger.service.systemd_notify import Stop, stopped_by_signals
+from logger.store.log.log_name import log_name
 
 PAUSE_S = 30
 
@@ -26,6 +29,8 @@ class RunQuestion(Question):
     """
 
     config: Annotated[Path | None, Option("settings (default: the machine's)", metavar="FILE", read=Path)] = None
+    learn_car: Annotated[bool, Option("learn the car from the logs, if vehicle is auto, and end: the service uses it "
+                                      "from its next start")] = False
 
 
 VERB = Verb(RunQuestion, "logger.commands.run:served", has_json=False)
@@ -34,8 +39,26 @@ VERB = Verb(RunQuestion, "logger.commands.run:served", has_json=False)
 def served(asked: RunQuestion) -> Checked:
     """Serve until it is told to stop."""
     logging.basicConfig(level=logging.INFO, format="%(levelname)s %(name)s: %(message)s")
+    if asked.learn_car:
+        return _learned(find_config(asked.config))
     with stopped_by_signals() as stop:
         return Checked("", {}, _is_served(asked, stop))
+
+
+def _learned(settings: Path) -> Checked:
+    """The car of all drives so far, where there are new ones: by a process of its own, as what the service loads is
+    little."""
+    if not learns_car(settings):
+        return Checked("vehicle is not auto: nothing to learn", {}, True)
+    config = load_config(settings)
+    folder = config.log.directory
+    logs = [name.session for path in folder.glob("*.csv") if (name := log_name(path))]
+    if config.wheelbase_m is None or not logs or max(logs) in learned_cars(folder):
+        return Checked("no new drives", {}, True)
+    mass = ("--mass", f"{config.mass_kg:g}") if config.mass_kg else ()
+    words = ("learn-car", folder, "--wheelbase", f"{config.wheelbase_m:g}", *mass, "--out",
+             folder / f"car-{max(logs):05d}.yaml")
+    return Checked("", {}, subprocess.run([Path(sys.executable).with_name("ridelog"), *words]).returncode == 0)
 
 
 def _is_served(asked: RunQuestion, stop: Stop) -> bool:

@@ -201,10 +201,12 @@ class SpectraKeeper:
         self._taken = self._seen = 0  # samples; blocks
         self._every = 1
         self._kept: list[bytes] = []
+        self._felt = np.zeros(2)  # sum of the readings, and how many
 
     def push(self, accel_mps2: Array, speed_mps: Array, usable: Bools) -> None:
-        """Samples (n,) that follow those before."""
+        """Samples (n,) that follow those before, gravity in them."""
         self._waiting.append((accel_mps2, speed_mps, usable))
+        self._felt += accel_mps2[usable].sum(), usable.sum()
         if sum(len(one) for one, _, _ in self._waiting) >= 2 * self._half:
             self._take(keep=self._half)
 
@@ -233,6 +235,7 @@ class SpectraKeeper:
         if not self._kept:
             return {}
         return {"form": _FORM, "noise": self._noise, "every": self._every, "blocks": len(self._kept),
+                "felt_mps2": round(float(self._felt[0] / self._felt[1]), 2),
                 "data": b64encode(compress(b"".join(self._kept))).decode("ascii")}
 
 

@@ -22,6 +22,7 @@ from logger.errors import BadInput
 from logger.shipped import shipped, vehicle_file, vehicle_path
 from logger.store.export.sticks import MODES, NOT_PAIRED, Pairing
 from logger.store.formats.yaml_nodes import Node, load_mapping
+from logger.store.log.log_name import CAR
 from logger.units import WINDOW_M
 from logger.vehicle.vehicle import GENERIC
 
@@ -31,6 +32,7 @@ AUTO = "auto"
 LEAST_NOISE_MPS2, MOST_NOISE_MPS2 = 1e-4, 100.0
 WHEELBASES_M, MASSES_KG = (1.5, 6.0), (300.0, 10_000.0)  # from the smallest car with two axles to a lorry
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
+GRAVITY_TOLERANCE_G = 0.4  # of what the axis that points up feels
 Read = Callable[[Node], Any]
 Section = TypeVar("Section")
 
@@ -65,6 +67,8 @@ def _file_to_write(node: Node) -> Path:
 
 
 def _vehicle(node: Node) -> Path:
+    if node.text() == AUTO:
+        return Path(AUTO)
     try:
         path = vehicle_path(node.text(), beside=Path(node.file).parent.resolve())
     except BadInput as error:
@@ -223,7 +227,25 @@ def find_config(given: Path | None) -> Path:
 
 def load_config(path: Path) -> Config:
     """Read the settings of a file. Raises BadInput, ``FILE:LINE: expected ...``, for anything not as documented."""
-    return _section(Config)(load_mapping(path))
+    config = _section(Config)(load_mapping(path))
+    if config.vehicle != Path(AUTO):
+        return config
+    if config.wheelbase_m is None:
+        raise BadInput(f"{path}: vehicle: auto: expected wheelbase_m, which drives are compared with, found none")
+    learned = learned_cars(config.log.directory)
+    return replace(config, vehicle=learned[max(learned)] if learned else vehicle_file(GENERIC))
+
+
+def learned_cars(folder: Path) -> dict[int, Path]:
+    """Cars that ``vehicle: auto`` learned from the logs in a folder, by the last session that each was learned from. A
+    car keeps its file, so that a recording can be replayed with the one it was driven with."""
+    return {int(match[1]): path for path in folder.glob("car-*.yaml") if (match := CAR.fullmatch(path.name))}
+
+
+def learns_car(path: Path) -> bool:
+    """Whether the settings of a file want the car learned from the logs."""
+    entry = load_mapping(path).mapping().get("vehicle")
+    return entry is not None and entry.text() == AUTO
 
 
 def load_pairing(path: Path) -> Pairing:

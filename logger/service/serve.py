@@ -19,7 +19,7 @@ from drivers.readings import GPS, Event
 from drivers.sources import SerialSource
 from logger.errors import BadInput
 from logger.service import wiring
-from logger.service.config import Config
+from logger.service.config import GRAVITY_TOLERANCE_G, Config
 from logger.service.event_core import EventCore
 from logger.service.learning import NoiseLearning, ReceiverLearning, delay_at_start, noise_at_start, read_delay
 from logger.service.main_loop import Listener, MainLoop, monotonic_us
@@ -36,7 +36,6 @@ from logger.units import STANDARD_GRAVITY_MPS2, US_PER_S
 
 HEALTH_LINE_US = 60 * US_PER_S
 RECENT_US = 15 * US_PER_S
-GRAVITY_TOLERANCE_G = 0.4
 LOOKS_WITHOUT_GRAVITY = 5
 UNREADABLE_S = 10.0
 _OTHER_UNITS = ((STANDARD_GRAVITY_MPS2, "it seems to send m/s2, and is read as g. Choose the profile lines_mps2"),

@@ -77,6 +77,7 @@ def test_the_steps_on_a_machine_are_exactly_these(tmp_path: Path) -> None:
         "write /etc/ridelog/ridelog.yaml",
         "write /etc/systemd/system/ridelog.service",
         "write /etc/systemd/system/ridelog-export@.service",
+        "write /etc/systemd/system/ridelog-car.service",
         "write /etc/udev/rules.d/90-ridelog.rules",
         "link /etc/systemd/system/multi-user.target.wants/ridelog.service to /etc/systemd/system/ridelog.service",
         "link /usr/local/bin/ridelog to /srv/ridelog/bin/ridelog",
@@ -92,13 +93,14 @@ def test_the_steps_on_a_machine_are_exactly_these(tmp_path: Path) -> None:
     take(installation(tmp_path, [], OTHER_PROGRAM).install())
     undone = OnThisMachine(tmp_path, OTHER_PROGRAM, run_command).uninstall()
     assert [step.words.replace(str(tmp_path), "") for step in undone] == [
-        "run systemctl stop ridelog.service ridelog-export@*.service",
+        "run systemctl stop ridelog.service ridelog-export@*.service ridelog-car.service",
         "remove /etc/systemd/system/multi-user.target.wants/ridelog.service",
         "remove /usr/local/bin/ridelog",
         "remove /etc/sysusers.d/ridelog.conf",
         "remove /etc/ridelog/ridelog.yaml",
         "remove /etc/systemd/system/ridelog.service",
         "remove /etc/systemd/system/ridelog-export@.service",
+        "remove /etc/systemd/system/ridelog-car.service",
         "remove /etc/udev/rules.d/90-ridelog.rules",
         "remove /etc/ridelog/installed.json",
         "remove /etc/ridelog if it is empty",

@@ -21,7 +21,7 @@ from logger.service.systemd_notify import PRIORITY
 from logger.shipped import shipped
 from logger.store.export import sticks
 
-SERVICE, EXPORT = "ridelog.service", "ridelog-export@.service"
+SERVICE, EXPORT, CAR = "ridelog.service", "ridelog-export@.service", "ridelog-car.service"
 MOST_EXPOSURE = 1.5
 needs_systemd = pytest.mark.skipif(shutil.which("systemd-analyze") is None, reason="no systemd-analyze here")
 
@@ -38,13 +38,13 @@ def settings(unit: str) -> dict[str, list[str]]:
 
 @pytest.fixture
 def units(tmp_path: Path) -> list[Path]:
-    """Both units as they are installed, the template for one stick."""
+    """The units as they are installed, the template for one stick."""
     for step in Installation(tmp_path, Path(sys.executable).with_name("ridelog"), lambda words: None).install():
         if step.act is not None:
             step.act()
     folder = tmp_path / "etc/systemd/system"
     shutil.copy(folder / EXPORT, folder / "ridelog-export@sda1.service")
-    return [folder / SERVICE, folder / "ridelog-export@sda1.service"]
+    return [folder / SERVICE, folder / "ridelog-export@sda1.service", folder / CAR]
 
 
 @needs_systemd
@@ -102,14 +102,15 @@ def runs_of(program: str) -> list[list[str]]:
 
 
 def test_every_command_line_is_one_that_the_program_takes() -> None:
-    ours = [line for unit in (SERVICE, EXPORT) for line in map(inner, command_lines(unit)) if line[0] == str(PROGRAM)]
-    assert len(ours) == 4
+    ours = [line for unit in (SERVICE, EXPORT, CAR) for line in map(inner, command_lines(unit))
+            if line[0] == str(PROGRAM)]
+    assert len(ours) == 5
     for line in ours:
         command(line[1])[0].parse_args(line[2:])
 
 
 def test_no_unit_and_no_rule_runs_a_shell() -> None:
-    programs = {inner(line)[0] for unit in (SERVICE, EXPORT) for line in command_lines(unit)}
+    programs = {inner(line)[0] for unit in (SERVICE, EXPORT, CAR) for line in command_lines(unit)}
     assert programs <= {str(PROGRAM), "/usr/bin/mount", "/usr/bin/umount", "/usr/bin/touch", "/usr/bin/rm"}
     text = (shipped("systemd") / "90-ridelog.rules").read_text()
     assert set(re.findall(r'RUN\+="(\S+)', text)) == {"/usr/bin/chgrp", "/usr/bin/chmod"}
@@ -123,7 +124,7 @@ def test_only_mounting_is_done_as_root() -> None:
     assert [inner(line)[0] for line in privileged] == ["/usr/bin/mount", "/usr/bin/umount", "/usr/bin/umount"]
     assert len(runs_of("/usr/bin/mount") + runs_of("/usr/bin/umount")) == len(privileged)
     assert not [value for value in written_lines(SERVICE) if "+" in value.split("/")[0]]
-    assert settings(SERVICE)["User"] == settings(EXPORT)["User"] == ["ridelog"]
+    assert settings(SERVICE)["User"] == settings(EXPORT)["User"] == settings(CAR)["User"] == ["ridelog"]
 
 
 def test_the_stick_is_mounted_so_that_nothing_on_it_can_act() -> None:

@@ -44,7 +44,7 @@ from logger.store.export.sticks import (
     trusted_sticks,
 )
 from logger.store.log.disk_quota import are_on_one_disk
-from logger.store.log.log_name import OwnFile, name_before, old_name
+from logger.store.log.log_name import CAR, OwnFile, name_before, old_name
 
 MARKS_NAME = "exported-marks"
 
@@ -222,7 +222,7 @@ def export(logs: Path, stick: Path, report: Callable[[Progress], None], pairing:
 
 
 def finished_files(card: DirectoryHandle) -> list[str]:
-    """Names of what can be exported, oldest first; each log is followed by its sidecar, recordings come last.
+    """Names of what can be exported, oldest first: each log followed by its sidecar, learned cars, recordings.
 
     What is being written has a name that ends in ``.part``.
     """
@@ -231,7 +231,8 @@ def finished_files(card: DirectoryHandle) -> list[str]:
                  if (file := OwnFile.of(name)) and not file.is_open)
     logs = [name for *_, name, kind in own
             if kind in (".csv", ".json") and str(Path(name).with_suffix(".csv")) in present]
-    return logs + [name for *_, name, kind in own if kind not in (".csv", ".json")]
+    return logs + sorted(filter(CAR.fullmatch, present)) + [
+        name for *_, name, kind in own if kind not in (".csv", ".json")]
 
 
 class _Export:

@@ -4,7 +4,8 @@ Files are found in a folder of logs, in which a service may be writing, or on a 
 
 ``<session>-<part>.csv.part`` while a log is open, ``.csv`` when it is finished; its sidecar ``.json``; recordings
 ``<session>.dump.gz`` and ``<session>-<part>.dump.gz``, while open with ``.part`` too. What an export found in the way
-of one of these on a stick is called ``<name>.<8 hex digits>.old``, those of one export with the same digits.
+of one of these on a stick is called ``<name>.<8 hex digits>.old``, those of one export with the same digits. A car
+that was learned from the sessions up to one is ``car-<session>.yaml``.
 
 The number of a session is never given twice, whatever is lost.
 """
@@ -29,6 +30,7 @@ PART = ".part"
 _SESSION, _NUMBER = "[0-9]{5,9}", "[0-9]{3,9}"
 _LOG = re.compile(rf"({_SESSION})-({_NUMBER})(?:(\.csv)(\.part)?|(\.json))")
 _DUMP = re.compile(rf"({_SESSION})(?:-([0-9]{{1,9}}))?(\.dump(?:\.gz)?)(\.part)?")
+CAR = re.compile(r"car-([0-9]{5,9})\.yaml")
 _ASIDE = re.compile(r"(.+)\.([0-9a-f]{8})\.old")
 _NUMBERED = re.compile(rf"({_SESSION})[-.]")
 
