@@ -536,6 +536,8 @@ def misfit(problem: UnknownCar, x: Array) -> float:
     """How far a car with coordinates (p,) is from the spectra, each block at its most probable level and waviness: the
     deviation of the mean power of each band and third of the speeds from what is expected, in standard deviations of
     chance (root mean square). A car that is right has 1."""
+    apart = float(np.hypot(WAVINESS_APART, problem.knowledge.waviness_within))  # no drive's own is known here
+    problem = UnknownCar(problem.spectra, replace(problem.knowledge, waviness_within=apart))
     roads, _ = problem.with_blocks(x, problem.start(x))
     road, noise = problem.expected_power(x, roads)
     speeds = problem.spectra.speed_mps

@@ -20,7 +20,7 @@ from logger.estimation.drive_spectra import (
     drive_spectra,
     middles_hz,
 )
-from logger.identification.unknown_car import BlockRoads, CarKnowledge, LearnedCar, UnknownCar
+from logger.identification.unknown_car import BlockRoads, CarKnowledge, LearnedCar, UnknownCar, misfit
 from logger.service import wiring
 from logger.service.config import load_config
 from logger.shipped import vehicle_file
@@ -125,6 +125,21 @@ def test_the_waviness_within_a_drive_is_learned(within: float) -> None:
     found, _ = problem.with_blocks(x, problem.start(x))
     learned = LearnedCar(problem.knowledge, x, np.eye(len(x)), found, 0.0, True)
     assert problem.waviness_within(learned) == pytest.approx(max(float(own.std()), 0.06), abs=0.04)
+
+
+def test_roads_of_unlike_waviness_are_no_trailer() -> None:
+    """The right car's misfit is that of chance, however little the waviness changes within a drive (17 where that of
+    drives is left out)."""
+    rng = np.random.default_rng(2)
+    speed = np.repeat(np.linspace(8.0, 26.0, 10), 30)
+    empty = DriveSpectra(speed, np.zeros(300), np.ones((300, len(middles_hz()))), np.full(300, 1e-5),
+                         np.arange(300) // 100)
+    problem = UnknownCar(empty, CarKnowledge(2.66, waviness_within=0.05))
+    x = problem.knowledge.mean
+    roads = BlockRoads(rng.normal(-12.0, 0.7, 300), np.zeros(300), np.array([-0.3, 0.1, 0.4]))
+    road, noise = problem.expected_power(x, roads)
+    problem.spectra.power[:] = (road + noise) * rng.gamma(problem.weight) / problem.weight
+    assert 0.8 < misfit(problem, x) < 1.25
 
 
 def test_the_spread_of_a_speed_is_that_under_the_window() -> None:
