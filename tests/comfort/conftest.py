@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import cache
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ from scipy import signal
 RATE_HZ = 100
 
 
+@cache
 def _body_acceleration(speed_mps: float, seed: int, seconds: float = 30.0, finer: int = 20) -> np.ndarray:
     """A quarter car over a random road with 30 mm bumps of 0.4 m, sampled at 100 Hz, some noise added [m/s2]."""
     rng = np.random.default_rng(seed)

@@ -32,7 +32,7 @@ def test_sums_are_those_of_drawn_paths(scale: float, level: float) -> None:
     lag = np.abs(np.subtract.outer(np.arange(COUNT), np.arange(COUNT)))
     covariance = np.outer(std, std) * correlation()[lag]
     rng = np.random.default_rng(1)
-    drawn = path(scale) + rng.multivariate_normal(np.zeros(COUNT), covariance, 200_000)
+    drawn = path(scale) + rng.multivariate_normal(np.zeros(COUNT), covariance, 50_000)
     for power, sum_of in ((2, square_sum), (4, fourth_power_sum)):
         found = sum_of(path(scale), std, correlation())
         sums = (drawn**power).sum(axis=1)

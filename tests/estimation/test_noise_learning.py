@@ -364,6 +364,6 @@ def test_the_few_readings_on_a_third_step_tell_the_noise(noise_steps: float) -> 
     count = 40_000
     reading = np.rint(0.5 + noise_steps * rng.standard_normal(count))
     assert 5e-5 < np.mean((reading < 0) | (reading > 1)) < 0.02
-    log_noise = np.log(np.linspace(0.15, 0.6, 451))
+    log_noise = np.log(np.linspace(0.15, 0.6, 91))
     evidence = interval_evidence(np.full(count, 0.5), np.full(count, 1e-6), reading - 0.5, reading + 0.5, log_noise)
     assert np.exp(log_noise[np.argmax(evidence)]) == pytest.approx(noise_steps, rel=0.04)

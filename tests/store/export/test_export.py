@@ -218,13 +218,13 @@ def test_names_without_end_on_a_stick_take_no_memory(
     real = os.scandir
 
     class Crowd:
-        """A folder that also holds 300,000 long names."""
+        """A folder that also holds 100,000 long names."""
 
         def __init__(self, place: int) -> None:
             self._entries = real(place)
 
         def __enter__(self) -> Iterator[SimpleNamespace]:
-            crowd = (SimpleNamespace(name=f"{number:06d}-{'x' * 240}") for number in range(300_000))
+            crowd = (SimpleNamespace(name=f"{number:06d}-{'x' * 240}") for number in range(100_000))
             return itertools.chain(self._entries, crowd)
 
         def __exit__(self, *_: object) -> None:
