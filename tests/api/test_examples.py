@@ -18,6 +18,7 @@ import pytest
 
 import logger.api
 import ridelog
+from logger.plugins import catalogue
 from logger.store.formats.effect_file import shipped_effects
 
 from ..support.slow import slow
@@ -49,10 +50,15 @@ def names(tmp_path_factory: pytest.TempPathFactory, short_dump: Path) -> dict[st
 @pytest.mark.parametrize("module", [
     pytest.param(one, marks=pytest.mark.slow if one.__name__ in SLOW else (), id=one.__name__) for one in MODULES])
 def test_examples(module: ModuleType, names: dict[str, Any], monkeypatch: pytest.MonkeyPatch) -> None:
-    """Once each: a function that asks a question shows the question's examples. A search has few effects to try."""
+    """Once each: a function that asks a question shows the question's examples. A search has few effects and families
+    of laws to try; among all of them it is judged in ``tests.lab``."""
     if "lab" in module.__name__:
         few = {name: shipped_effects()[name] for name in ("sensor_gain", "sensor_offset", "time_offset")}
         monkeypatch.setattr("logger.store.formats.effect_file.shipped_effects", lambda: few)
+        families = {name: one for name, one in catalogue("logger.lab.laws.families", "FAMILY").items()
+                    if name in ("changing_gain", "force_by_rate", "hum")}
+        assert len(families) == 3
+        monkeypatch.setattr("logger.api.lab.learn.catalogue", lambda *_: families)
     runner = doctest.DocTestRunner(optionflags=doctest.ELLIPSIS)
     for one in doctest.DocTestFinder().find(module, extraglobs=names):
         holder = getattr(module, one.name.removeprefix(f"{module.__name__}."), None)
