@@ -105,16 +105,17 @@ def test_how_sure_a_word_is() -> None:
 
 
 @pytest.mark.slow
-def test_gdal_reads_what_is_to_be_reviewed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_gdal_reads_what_is_to_be_reviewed(
+        short_dump: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     pyogrio = pytest.importorskip("pyogrio")
-    assert main(["demo", "--out", str(tmp_path / "demo")]) == 0
+    assert main(["replay", str(short_dump), "--out", str(tmp_path / "logs")]) == 0
     ways, out = tmp_path / "ways.geojson", tmp_path / "review.geojson"
-    rows = read_log_line(tmp_path / "demo")
+    rows = read_log_line(tmp_path / "logs")
     ways.write_text(json.dumps({"type": "FeatureCollection", "features": [
         {"type": "Feature", "id": "way/4711", "properties": {"highway": "primary"},
          "geometry": {"type": "LineString", "coordinates": rows}}]}))
     capsys.readouterr()
-    assert main(["convert", str(tmp_path / "demo"), "--smoothness", str(ways), "--to", str(out)]) == 0
+    assert main(["convert", str(tmp_path / "logs"), "--smoothness", str(ways), "--to", str(out)]) == 0
     assert "1 way" in capsys.readouterr().out
     _, _, geometry, columns = pyogrio.raw.read(out)
     assert len(geometry) == 1
