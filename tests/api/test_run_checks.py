@@ -11,6 +11,7 @@ import pytest
 from logger.api.drives import Run, profile_of
 from logger.api.lab.checks import driven_stretches, thinned_runs, unexplained_up_to_hz
 from logger.errors import BadInput
+from logger.profiles.excitation import AppliedForce, Excitation
 from logger.runs import CLIPPED, NO_READING, READING, SKIP_S
 
 from ..support.lab.runs_with_residual import a_run
@@ -76,3 +77,19 @@ def test_a_rig_keeps_the_band_in_which_its_model_lacks_something(model_has_it: b
     readings = low + high + np.random.default_rng(1).normal(0, 1, 3000)
     run = replace(run, rate_hz=400.0, measured_mps2=readings)
     assert unexplained_up_to_hz(run, model_has_it * high) == pytest.approx(up_to_hz, abs=0.7)  # two lines of a block
+
+
+@pytest.mark.parametrize("rang_mps2", [0.0, 0.1, 0.02])
+def test_a_rig_that_rests_until_it_is_struck_loses_no_beginning(rang_mps2: float) -> None:
+    """A mass at 6 Hz, struck by a hammer after 0.4 s, is the closed form of an impulse; noise and hum of 0.01 m/s2. One
+    that rang before by more than these begins in a state that nobody knows."""
+    time_s, rng = np.arange(2000) / 500, np.random.default_rng(3)
+    since_s = time_s - 0.4
+    rings = 8 * np.exp(-2 * since_s) * np.cos(37.7 * since_s) * (since_s >= 0) + rang_mps2 * np.cos(37.7 * time_s)
+    noise = rng.normal(0, 0.01, 2000) + 0.01 * np.sin(314 * time_s)
+    force_n = np.exp(-((since_s / 0.003) ** 2)) * 300 + rng.normal(0, 0.1, 2000)
+    struck = Excitation(500.0, np.zeros(2000), force_n=force_n[:, None], forces=(AppliedForce("force_n", ("body",)),))
+    still = np.zeros(2000)
+    (run,) = driven_stretches(Run(Path("run"), 500.0, time_s, rings + noise, still, still, None, None,
+                                  excitation=struck), shortest_s=3.0)
+    assert run.first == (1000 if rang_mps2 else 0)

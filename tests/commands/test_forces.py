@@ -580,6 +580,29 @@ def test_a_second_mode_is_a_mass_that_swings_on_the_first(tmp_path: Path) -> Non
 
 
 @pytest.mark.slow
+def test_what_swings_sharply_on_a_mass_that_nobody_knows_is_found(tmp_path: Path, capsys: pytest.CaptureFixture[str]
+                                                                   ) -> None:
+    """A twelfth of the mass at 11 Hz, damped by 4 %: two masses in SciPy's linear simulation."""
+    mass, hung, omega = 3.0, 0.25, 2 * np.pi * 11.0
+    spring, damper = hung * omega**2, 2 * 0.04 * omega * hung
+    within = np.array([[-(3500 + spring) / mass, spring / mass, -(9 + damper) / mass, damper / mass],
+                       [spring / hung, -spring / hung, damper / hung, -damper / hung]])
+    system = (np.vstack([np.eye(4)[2:], within]), np.array([[0.0], [0.0], [1 / mass], [0.0]]),
+              within[:1], np.array([[1 / mass]]))
+    push = noise(25.0, 8.0, 6)
+    accel = lsim(system, push(FINE_S), FINE_S)[1][::16] + np.random.default_rng(8).normal(0.0, 0.01, len(TIME_S))
+    run = written(tmp_path / "run", {"accel_z_mps2": accel}, {"force_n": push(TIME_S)}, BODY)
+    (tmp_path / "rig.yaml").write_text("name: rig\nmodel: single_mass\nmass_kg: 3.05 +- 2%\n"
+                                       "stiffness_n_per_m: 4100\ndamping_n_s_per_m: 5\n")
+    assert main(["add-effect", "occupant", "--tolerance", "unknown", "--vehicle", str(tmp_path / "rig.yaml"), "--out",
+                 str(tmp_path / "with.yaml"), str(run), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)["parameters"]
+    assert found["frequency_hz"] == pytest.approx(11.0, rel=0.005)
+    assert found["damping_ratio"] == pytest.approx(0.04, rel=0.05)
+    assert found["mass_kg"] == pytest.approx(hung, rel=0.05)
+
+
+@pytest.mark.slow
 def test_a_circuit_of_tiny_numbers_is_named_a_hardening_spring(tmp_path: Path, capsys: pytest.CaptureFixture[str]
                                                               ) -> None:
     """Places alone are measured, of a mass of 5 mg; the file is off by some per cent."""
@@ -679,6 +702,21 @@ def test_an_orifice_and_a_coil_that_saturates_are_found(
         found = json.loads(capsys.readouterr().out)
         assert found["parameters"][number] == pytest.approx(is_there, rel=0.02)
         assert found["error_after"] < 0.01
+
+
+@pytest.mark.slow
+def test_an_amplifier_that_clips_is_no_coil_that_saturates(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    true, command = Bench(2.0, 1800.0, 8.0), noise(20.0, 6.0, 9)
+    measured = true.moved(NOTHING, lambda t: np.clip(command(t), -7.0, 7.0), NOTHING)["accel_z_mps2"]
+    measured = measured + np.random.default_rng(8).normal(0.0, 2e-3 * measured.std(), len(measured))
+    run = written(tmp_path / "run", {"accel_z_mps2": measured}, {"force_n": command(TIME_S)}, BODY)
+    (tmp_path / "rig.yaml").write_text(true.yaml)
+    assert main(["add-effect", "force_limit", "--vehicle", str(tmp_path / "rig.yaml"), "--out",
+                 str(tmp_path / "with.yaml"), str(run), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["parameters"]["limit_n"] == pytest.approx(7.0, rel=0.02)
+    assert found["parameters"]["sharpness_ratio"] > 10.0
+    assert found["error_after"] < 0.02
 
 
 def test_a_rig_that_no_force_drives_has_no_coil_that_saturates(tmp_path: Path) -> None:

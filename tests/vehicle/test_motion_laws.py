@@ -12,6 +12,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from scipy.integrate import quad
+from scipy.optimize import brentq
 
 from logger.api.lab.bench import among, known_effects, sought_effects
 from logger.errors import BadInput
@@ -133,10 +134,12 @@ def test_a_rig_comes_to_rest_and_stays() -> None:
 
 
 @pytest.mark.parametrize(("travel_m", "sharpness", "reversal"), [
-    (3e-5, 1.0, 1.0), (0.0003, 1.0, 1.0), (0.002, 1.0, 1.0), (0.004, 2.0, 1.0), (0.001, 0.7, 1.0), (0.002, 1.0, 2.0)])
+    (3e-5, 1.0, 1.0), (0.0003, 1.0, 1.0), (0.002, 1.0, 1.0), (0.004, 2.0, 1.0), (0.001, 0.7, 1.0), (0.002, 1.0, 2.0),
+    (0.01, 1.0, -5.0)])
 def test_hysteresis_moves_as_newton_says(travel_m: float, sharpness: float, reversal: float, plain: np.ndarray) -> None:
     def added(t, x, v, d, d_mps, u_mps, z):
-        grow = v / travel_m * (1 - abs(z[0]) ** sharpness * (1.0 if v * z[0] > 0 else 1.0 - reversal))
+        loading, unloading = (1.0, 1.0 - reversal) if reversal > 0 else (1 / reversal, 1 / reversal - 1)
+        grow = v / travel_m * (1 - abs(z[0]) ** sharpness * (loading if v * z[0] > 0 else unloading))
         return 120 * z[0], -120 * z[0], [grow]
 
     expected = by_newton(added, 1)[:, :4]
@@ -198,6 +201,17 @@ def test_the_loop_is_as_large_as_it_has_to_be() -> None:
             low, high = (z1, high) if z1 - np.log(1 - z1) < 2 * small / y else (low, z1)
         curved, _ = quad(lambda x: 1 - np.exp(-x / y), 0, 2 * small - z1 * y)
         assert loop_area_n_m(small, values) == pytest.approx(2 * force_n * (curved - z1**2 * y / 2), rel=1e-3)
+
+
+@pytest.mark.parametrize("reversal", [-0.5, -4.0])
+def test_the_loop_of_what_hardens_is_as_large_as_it_has_to_be(reversal: float) -> None:
+    """n = 1. Each half way begins at -z1: back to 0 with 1 + (1 + h) |z|, h = -1 / r, then on to z1 with 1 + h z."""
+    force_n, y, h, a = 120.0, 0.002, -1 / reversal, 0.0015
+    values = SimpleNamespace(yield_force_n=force_n, yield_travel_m=y, sharpness_ratio=1.0, reversal_ratio=reversal)
+    c = 1 + h
+    z1 = brentq(lambda z: np.log1p(h * z) / h + np.log1p(c * z) / c - 2 * a / y, 0.0, 10.0)
+    area = 2 * force_n * y * ((z1 / h - np.log1p(h * z1) / h**2) - (z1 / c - np.log1p(c * z1) / c**2))
+    assert loop_area_n_m(a, values) == pytest.approx(area, rel=1e-3)
 
 
 def test_no_friction_gives_energy() -> None:

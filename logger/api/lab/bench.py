@@ -124,8 +124,8 @@ class Bench:
 
     def named(self, name: str) -> tuple[Effect, str | None]:
         """An effect by its name or that of its file, and the file. BadInput where it is not known."""
-        if name in self.effects:
-            return self.effects[name], self.files.get(name)
+        if (known := self.effects.get(name) or self.last.get(name)) is not None:
+            return known, self.files.get(name)
         effect, file = effect_named(name)
         return (effect if file else sized(effect, self.model.vehicle)), file
 

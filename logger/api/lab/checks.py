@@ -89,6 +89,9 @@ _SIZES = {"force": (("kN", 1e-3), ("kgf", 1 / STANDARD_GRAVITY_MPS2), ("lbf", 1 
 _KINDS = {"displacement": "length", "travel": "length"}
 _APART = 2.0  # kgf and lbf are
 _NO_EFFECT = 20.0  # by so many times no effect and no resonance change all of a signal (a judgement)
+_NOT_DRIVEN, _FEWEST_AT_REST = 0.01, 50
+"""A rig is not driven by less than a hundredth of the most that drives it (a judgement); of so many samples of white
+noise von Neumann's ratio is below 1 once in 10,000 times (its standard deviation is 2 over their root)."""
 ANYWAY = "--anyway goes on"
 
 
@@ -467,13 +470,30 @@ def driven_stretches(drive: Drive, shortest_s: float = LEAST_S) -> list[Run]:
         samples = drive.accel_z_mps2[part]
         return samples if zero_is_known(drive.facts.main, drive.track) else samples - samples.mean()
 
-    return [Run(str(drive.path) if whole else
+    runs = [Run(str(drive.path) if whole else
                 f"{drive.path} ({drive.time_s[part.start]:.0f} to {drive.time_s[part.stop - 1]:.0f} s)",
                 drive.rate_hz, main(part), drive.distance_m[part], drive.speed_mps[part],
                 drive.track.begun(part.start / drive.rate_hz), past_of(drive.track).value, facts=drive.facts,
                 usable=drive.marks(part), more=_more(drive, part),
                 left_out=(*([cut] if part is parts[0] else []), *no_readings(drive.marks(part))))
             for part in parts]
+    return [replace(run, skip_s=0.0) if _rests_until_driven(run) else run for run in runs]
+
+
+def _rests_until_driven(run: Run) -> bool:
+    """Whether a rig's run begins at rest, as before the first blow of a hammer: until something drives it, each of its
+    signals moves by less than its noise, by J. von Neumann's ratio (Annals of Mathematical Statistics 12, 1941), which
+    is 2 of white noise and 1 where as much power is motion."""
+    track = run.track
+    if not isinstance(track, Excitation) or track.moves_part or track.start_s > 0:
+        return False
+    driven = np.hstack([track.elevation_m.reshape(len(track.elevation_m), -1),
+                        *([] if track.force_n is None else [track.force_n])])
+    driven = np.abs(driven - driven[0])
+    first = int(np.argmax((driven > _NOT_DRIVEN * driven.max(axis=0)).any(axis=1)))
+    count = int((first / track.rate_hz + track.start_s) * run.rate_hz)
+    still = np.stack([run.measured_mps2, *run.more])[:, :max(count, 0)]
+    return count >= _FEWEST_AT_REST and bool((np.diff(still).var(axis=1) >= still.var(axis=1)).all())
 
 
 def least_s(drive: Drive, vehicle: Vehicle | None = None) -> float:

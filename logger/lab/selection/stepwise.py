@@ -319,11 +319,10 @@ class Search(Generic[M, P, F]):
 
     def best_of(self, effect: Effect, base: M, values: Mapping[str, float]) -> M:
         """A model with one effect more, with these of its choices, whatever it gains; with its refinements where they
-        explain most of what its plain form leaves."""
+        explain most of what its plain form leaves, or that gains nothing."""
         with ThreadPoolExecutor(self.workers) as pool:
             one = self._screen_all(pool, base, [effect])[0]
         tries = self.likelihood.fitted_roughly(base.score, base, one, -np.inf)
-        tries = [each for each in tries if each.chosen.is_plain] or tries
         if not tries:
             raise ValueError(f"expected a car that can be simulated with {effect.name}, found none at its usual values")
         said = [each for each in tries if all(each.chosen.values[name] == value for name, value in values.items())]
@@ -541,14 +540,15 @@ class Search(Generic[M, P, F]):
 
     def _best_of_each(self, fits: Sequence[F]) -> list[F]:
         """The best fit of each effect, best first: in both axles, where one of them alone cannot be distinguished; in
-        its plain form, unless its refinements explain most of what that leaves."""
+        its plain form, unless that gains nothing, or its refinements explain most of what it leaves."""
         found: dict[bool, dict[str, F]] = {True: {}, False: {}}
         for one in sorted(fits, key=lambda one: -one.gain - INDISTINGUISHABLE * (not one.chosen.where)):
             found[one.chosen.is_plain].setdefault(one.effect.name, one)
         plain, refined = found[True], found[False]
         best = {**refined, **plain, **{name: one for name, one in refined.items() if name in plain
                                        and not one.chosen.is_refined_too_far
-                                       and self.likelihood.explains_most(plain[name], one)}}
+                                       and (plain[name].gain < 0 < one.gain
+                                            or self.likelihood.explains_most(plain[name], one))}}
         return sorted(best.values(), key=lambda one: -one.gain)
 
     def _may_win(self, base: M, screened: Sequence[P], enough: float) -> list[tuple[M, P]]:

@@ -1,7 +1,8 @@
 """What pushes a rig has no more force than it has: a coil, a motor or a valve saturates.
 
-The command, or the current, was recorded as a force F; what acts is L tanh(F / L), which is F while it is small and no
-more than L.
+The command, or the current, was recorded as a force F; what acts is L tanh((F / L)^n)^(1 / n), which is F while it is
+small and no more than L. In its plain form n is 1, as iron saturates; the larger it is, the sharper the limit, down to
+the corner of an amplifier that clips.
 """
 
 import numpy as np
@@ -9,20 +10,28 @@ import numpy as np
 from logger.arrays import Array
 from logger.vehicle.effect import ActuatorEffect, Parameter, Scale, Sought, Values
 
+_SATURATED = 20.0
+"""Of which tanh is 1 in double precision."""
+
 
 class ForceLimit(ActuatorEffect):
     title = "a shaker, coil or motor that saturates"
     parameters = (
         Parameter("limit_n", 500.0, 1.0, 1e7, float("inf"), Scale.RECIPROCAL, (100.0, 500.0, 2500.0),
                   "largest force that acts, of each recorded force"),
+        Parameter("sharpness_ratio", 1.0, 0.5, 1000.0, None, Scale.LOG, (4.0,),
+                  "exponent: the higher, the sharper the limit", default=1.0),
     )
     source = "K. J. Astrom, L. Rundqwist, Proc. American Control Conference (1989) 1693: actuators that saturate"
     signature = "strong pushes move it less, in proportion, than weak ones, at all frequencies"
     shown_by = "push it weakly and strongly with the same motion"
     sought = Sought.ON_RIGS
+    refinements = ("sharpness_ratio",)
 
     def force(self, p: Values, rate_hz: float, force_n: Array) -> Array:
-        return np.asarray(p.limit_n * np.tanh(force_n / p.limit_n))
+        whole = _SATURATED ** (1 / p.sharpness_ratio)
+        share = np.minimum(np.abs(force_n / p.limit_n), whole) ** p.sharpness_ratio
+        return np.asarray(p.limit_n * np.copysign(np.tanh(share) ** (1 / p.sharpness_ratio), force_n))
 
 
 EFFECT = ForceLimit()

@@ -1,14 +1,17 @@
 """Rubber bushings and leaves give a little before they slide: the force depends on the way that they have come.
 
-The force F z in each suspension has a memory z, from -1 to 1. With y the travel in which it would yield at its first
-stiffness F / y, and n the sharpness of the yield,
+The force F z in each suspension has a memory z. With y the travel in which it would reach F at its first stiffness
+F / y, and n the sharpness of the yield,
 
-    z' = (x' / y) (1 - |z|^n (1 - r / 2 + r / 2 sign(x' z)))
+    z' = (x' / y) (1 - |z|^n (q - b + b sign(x' z)))
 
-which is the law of Bouc and Wen with A = 1, beta = r / 2 and gamma = 1 - beta: where it is let go its stiffness is r
-times its first one, and after a long way it is Coulomb friction. In its plain form n and r are 1; with r = 2 it is the
-law of Dahl. Without a yield travel it is ``dry_friction`` from the beginning: seals and bearings yield within
-hundredths of a millimetre (B. Armstrong-Helouvry and others, Automatica 30, 1994).
+which is the law of Bouc and Wen with A = 1, beta = b and gamma = q - b. Where r is above 0, q is 1 and b is r / 2: it
+yields, where it is let go its stiffness is r times its first one, and after a long way it is Coulomb friction. In its
+plain form n and r are 1; with r = 2 it is the law of Dahl. Where r is below 0, q is 1 / r and b is 1 / 2: it hardens as
+it is loaded, and at F is stiffer by its first stiffness where it is let go (J. P. Noel and M. Schoukens, Workshop on
+Nonlinear System Identification Benchmarks, Brussels 2016). Any closed way takes energy, as beta is above 0. Without a
+yield travel it is ``dry_friction`` from the beginning: seals and bearings yield within hundredths of a millimetre (B.
+Armstrong-Helouvry and others, Automatica 30, 1994).
 
 A search tries it first of a part alone on its bench, as rubber does that; of a car, where it makes a search half as
 long again, when all others leave something unexplained.
@@ -18,11 +21,12 @@ from typing import Any
 
 import numpy as np
 
-from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Sought, Values
+from logger.vehicle.effect import AXLE, ForceEffect, Misalignment, Parameter, Scale, Sought, Values
 from logger.vehicle.laws import Between, CornerLaws, Seen
 
 MOST = 10.0
-"""A memory gets far beyond 1 only by a step that is too long for a sharp yield over a short travel (a judgement)."""
+"""A memory that yields gets far beyond 1 only by a step that is too long for a sharp yield over a short travel; one
+that hardens does so no more beyond it (a judgement)."""
 
 
 def force(p: Any, seen: Seen) -> Any:
@@ -32,9 +36,9 @@ def force(p: Any, seen: Seen) -> Any:
 
 def rates(p: Any, seen: Seen) -> tuple[Any]:
     """How fast the memory grows [1/s]."""
-    z = seen.memory[0]
-    shape = 0.5 * p.reversal_ratio
-    held = np.abs(z) ** p.sharpness_ratio * (1.0 - shape + shape * np.sign(seen.rate_mps * z))
+    z, ratio = seen.memory[0], p.reversal_ratio
+    loading, beta = (1.0, 0.5 * ratio) if ratio >= 0 else (1.0 / ratio, 0.5)
+    held = np.minimum(np.abs(z), MOST) ** p.sharpness_ratio * (loading - beta + beta * np.sign(seen.rate_mps * z))
     return (seen.rate_mps / p.yield_travel_m * (1.0 - held),)
 
 
@@ -45,10 +49,10 @@ class Hysteresis(ForceEffect):
                   "at which it slides"),
         Parameter("yield_travel_m", 0.002, 1e-5, 0.05, None, Scale.LOG, (0.0005, 0.004),
                   "over which the initial stiffness would reach that force"),
-        Parameter("sharpness_ratio", 1.0, 0.2, 10.0, None, Scale.LOG, (0.5, 2.0),
+        Parameter("sharpness_ratio", 1.0, 0.2, 10.0, None, Scale.LOG, (0.5, 1.0, 2.0),
                   "exponent: the higher, the sharper the yield", default=1.0),
-        Parameter("reversal_ratio", 1.0, 1.0, 4.0, None, Scale.LINEAR, (1.0, 2.0),
-                  "stiffness in unloading over the initial one", default=1.0),
+        Parameter("reversal_ratio", 1.0, -20.0, 4.0, None, Scale.LINEAR, (1.0, 2.0, -4.0),
+                  "stiffness in unloading over the initial one; below 0: it hardens", default=1.0),
         AXLE,
     )
     source = ("R. Bouc, Proc. 4th Conf. on Nonlinear Oscillation, Prague (1967) 315; Y.-K. Wen, J. Eng. Mech. Div. "
@@ -58,6 +62,11 @@ class Hysteresis(ForceEffect):
     sought = Sought.ON_PARTS
     sought_last = True
     refinements = ("sharpness_ratio", "reversal_ratio")
+
+    def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
+        """Rubber yields over a tenth of its travel, and hardens over all of it."""
+        return [{**one, "yield_force_n": 10 * one["yield_force_n"], "yield_travel_m": 10 * one["yield_travel_m"]}
+                if one["reversal_ratio"] < 0 else one for one in super().trials(seen)]
 
     def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
         if p.yield_force_n == 0:

@@ -7,8 +7,11 @@ gives has a second mode, which is that of a mass on a spring.
 
 import numpy as np
 
-from logger.vehicle.effect import BodyEffect, Parameter, Scale, Values
+from logger.vehicle.effect import BodyEffect, Misalignment, Parameter, Scale, Values, resonances_hz
 from logger.vehicle.structure import Structure, hung
+
+_LIGHTLY_DAMPED = 0.05
+"""As rubber under a machine or a clamped beam is (C. M. Harris, A. G. Piersol, Shock and Vibration Handbook, 2002)."""
 
 
 class Occupant(BodyEffect):
@@ -31,4 +34,14 @@ class Occupant(BodyEffect):
         return hung(structure, mass, mass * omega**2, 2 * p.damping_ratio * omega * mass, structure.body[:, 0])
 
 
+class _OnMass(Occupant):
+    def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
+        """As steel and rubber damp too, and frequencies as near to each other as what swings there resonates."""
+        mass, frequency, damping = self.parameters
+        return [{"mass_kg": mass.trials[0], "frequency_hz": frequency_hz, "damping_ratio": ratio}
+                for ratio in (*damping.trials, _LIGHTLY_DAMPED)
+                for frequency_hz in resonances_hz(frequency.low, frequency.high, ratio)[:-1]]
+
+
 EFFECT = Occupant()
+EFFECT.variants = {"single_mass": _OnMass()}
