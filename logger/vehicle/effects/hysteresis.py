@@ -25,8 +25,8 @@ from logger.vehicle.effect import AXLE, ForceEffect, Misalignment, Parameter, Sc
 from logger.vehicle.laws import Between, CornerLaws, Seen
 
 MOST = 10.0
-"""A memory that yields gets far beyond 1 only by a step that is too long for a sharp yield over a short travel; one
-that hardens does so no more beyond it (a judgement)."""
+"""A memory that yields gets far beyond 1 only by a step that is too long for a sharp yield over a short travel, and what
+hardens is no more than so many times stiffer than at first (judgements)."""
 
 
 def force(p: Any, seen: Seen) -> Any:
@@ -38,8 +38,8 @@ def rates(p: Any, seen: Seen) -> tuple[Any]:
     """How fast the memory grows [1/s]."""
     z, ratio = seen.memory[0], p.reversal_ratio
     loading, beta = (1.0, 0.5 * ratio) if ratio >= 0 else (1.0 / ratio, 0.5)
-    held = np.minimum(np.abs(z), MOST) ** p.sharpness_ratio * (loading - beta + beta * np.sign(seen.rate_mps * z))
-    return (seen.rate_mps / p.yield_travel_m * (1.0 - held),)
+    held = np.abs(z) ** p.sharpness_ratio * (loading - beta + beta * np.sign(seen.rate_mps * z))
+    return (seen.rate_mps / p.yield_travel_m * (1.0 - np.maximum(held, -MOST)),)
 
 
 class Hysteresis(ForceEffect):
