@@ -326,7 +326,8 @@ class Search(Generic[M, P, F]):
         if not tries:
             raise ValueError(f"expected a car that can be simulated with {effect.name}, found none at its usual values")
         said = [each for each in tries if all(each.chosen.values[name] == value for name, value in values.items())]
-        best = self._best_of_each([self.likelihood.refined(base, each, 0.0) for each in said or tries])[0]
+        ends = [self.likelihood.refined(base, each, 0.0) for each in said or tries]
+        best = self._best_of_each([each for each in ends if each.gain > 0] or ends)[0]
         return self._refined(self.likelihood.with_effect(best))
 
     def run(self, before: M) -> Selection[M, P, F]:
@@ -540,15 +541,14 @@ class Search(Generic[M, P, F]):
 
     def _best_of_each(self, fits: Sequence[F]) -> list[F]:
         """The best fit of each effect, best first: in both axles, where one of them alone cannot be distinguished; in
-        its plain form, unless that gains nothing, or its refinements explain most of what it leaves."""
+        its plain form, unless its refinements explain most of what that leaves."""
         found: dict[bool, dict[str, F]] = {True: {}, False: {}}
         for one in sorted(fits, key=lambda one: -one.gain - INDISTINGUISHABLE * (not one.chosen.where)):
             found[one.chosen.is_plain].setdefault(one.effect.name, one)
         plain, refined = found[True], found[False]
         best = {**refined, **plain, **{name: one for name, one in refined.items() if name in plain
                                        and not one.chosen.is_refined_too_far
-                                       and (plain[name].gain < 0 < one.gain
-                                            or self.likelihood.explains_most(plain[name], one))}}
+                                       and self.likelihood.explains_most(plain[name], one)}}
         return sorted(best.values(), key=lambda one: -one.gain)
 
     def _may_win(self, base: M, screened: Sequence[P], enough: float) -> list[tuple[M, P]]:

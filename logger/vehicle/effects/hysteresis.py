@@ -25,8 +25,8 @@ from logger.vehicle.effect import AXLE, ForceEffect, Misalignment, Parameter, Sc
 from logger.vehicle.laws import Between, CornerLaws, Seen
 
 MOST = 10.0
-"""A memory that yields gets far beyond 1 only by a step that is too long for a sharp yield over a short travel, and what
-hardens is no more than so many times stiffer than at first (judgements)."""
+"""A memory that yields gets far beyond 1 only by a step that is too long for a sharp yield over a short travel, and
+what hardens is no more than so many times stiffer than at first (judgements)."""
 
 
 def force(p: Any, seen: Seen) -> Any:
