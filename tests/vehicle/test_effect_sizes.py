@@ -34,7 +34,7 @@ def test_forces_springs_dampers_and_travels_of_a_rig_follow() -> None:
 
 def test_bounds_hold_what_they_held_and_the_new_values() -> None:
     for effect in shipped_effects().values():
-        for one, now in zip(effect.parameters, sized(effect, RIG).parameters, strict=True):
+        for one, now in zip(effect.on(RIG).parameters, sized(effect, RIG).parameters, strict=True):
             assert now.low <= one.low <= one.high <= now.high
             assert all(now.low <= value <= now.high for value in (now.start, *now.trials))
 

@@ -272,6 +272,21 @@ def test_an_occupant_takes_the_frequency_it_is_given() -> None:
     assert made.mass.diagonal() == pytest.approx([430, 55, 70])
 
 
+@pytest.mark.parametrize("place_m", [-2.1, 0.0, 0.4])
+def test_an_occupant_pushes_where_it_stands(place_m: float) -> None:
+    """Force balance and moments of a shaken half car: m q'' = -F, heave adds F and pitch ahead times F."""
+    added = {"ahead_m": place_m} if place_m else {}
+    chosen_one = usual(EFFECTS["occupant"], mass_kg=70, frequency_hz=3.5, damping_ratio=0.2, **added)
+    made, plain = compose(HALF, [chosen_one]).structure, compose(HALF).structure
+    s = 2j * np.pi * 3.1
+    q = np.linalg.solve(made.mass * s * s + made.damping * s + made.stiffness, made.road.sum(axis=1))
+    omega = 2 * np.pi * 3.5
+    force = 70 * (omega**2 + 0.4 * omega * s) * (q[-1] - q[0] - place_m * q[1])
+    assert 70 * s * s * q[-1] == pytest.approx(-force, rel=1e-9)
+    onto = (plain.mass * s * s + plain.damping * s + plain.stiffness) @ q[:-1] - plain.road.sum(axis=1)
+    assert onto == pytest.approx(np.array([force, place_m * force, 0, 0]), rel=1e-9, abs=1e-6)
+
+
 @pytest.mark.parametrize("ends_move", [0.0, 1.0])
 def test_a_body_that_bends_does_as_its_equation_says(ends_move: float) -> None:
     """e'' + 2 z w e' + w^2 e = p F / m, the sensor reading the body's acceleration plus e''."""

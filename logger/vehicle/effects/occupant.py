@@ -1,12 +1,13 @@
-"""People ride on seats: a mass on a spring and a damper upon the body, at its centre of gravity.
+"""People ride on seats: a mass on a spring and damper on the body, at its centre of gravity unless given a place.
 
 The mass is more than what the model's sprung mass says, in a half car that of one side, as all its masses are;
-frequency and damping ratio are those of the seat with it. On a rig it is whatever swings there: a part of it that
-gives has a second mode, which is that of a mass on a spring.
+frequency and damping ratio are those of the seat with it. An engine on its mounts or a trailer is the same elsewhere.
+On a rig it is whatever swings there: a part of it that gives has a second mode, which is that of a mass on a spring.
 """
 
 import numpy as np
 
+from logger.arrays import Array
 from logger.vehicle.effect import BodyEffect, Misalignment, Parameter, Scale, Values, resonances_hz
 from logger.vehicle.structure import Structure, hung
 
@@ -14,9 +15,9 @@ _LIGHTLY_DAMPED = 0.05
 """As rubber under a machine or a clamped beam is (C. M. Harris, A. G. Piersol, Shock and Vibration Handbook, 2002)."""
 
 
-class Occupant(BodyEffect):
+class _AtCentre(BodyEffect):
     title = "a mass on a spring on the body, such as passengers on their seats"
-    parameters = (
+    parameters: tuple[Parameter, ...] = (
         Parameter("mass_kg", 70.0, 0.0, 1000.0, 0.0, Scale.LINEAR, (60.0,),
                   "on the spring; in a half car on one side"),
         Parameter("frequency_hz", 4.0, 0.8, 15.0, None, Scale.LOG, (2.5, 4.0, 6.0, 12.0),
@@ -31,10 +32,24 @@ class Occupant(BodyEffect):
         if p.mass_kg == 0:
             return structure
         mass, omega = structure.sides * p.mass_kg, 2 * np.pi * p.frequency_hz
-        return hung(structure, mass, mass * omega**2, 2 * p.damping_ratio * omega * mass, structure.body[:, 0])
+        return hung(structure, mass, mass * omega**2, 2 * p.damping_ratio * omega * mass, self.attached(p, structure))
+
+    def attached(self, p: Values, structure: Structure) -> Array:
+        """The end of its spring moves as this (n,) times the structure's coordinates."""
+        return structure.body[:, 0]
 
 
-class _OnMass(Occupant):
+class Occupant(_AtCentre):
+    parameters = (*_AtCentre.parameters, Parameter(
+        "ahead_m", 0.5, -5.0, 5.0, None, Scale.LINEAR, (-2.0, -0.5, 0.5, 1.5),
+        "where it stands, ahead of the centre of gravity", default=0.0))
+    refinements = ("ahead_m",)
+
+    def attached(self, p: Values, structure: Structure) -> Array:
+        return np.asarray(structure.body @ np.array([1.0, p.ahead_m, 0.0]))
+
+
+class _OnMass(_AtCentre):
     def trials(self, seen: Misalignment | None = None) -> list[dict[str, float]]:
         """As steel and rubber damp too, and frequencies as near to each other as what swings there resonates."""
         mass, frequency, damping = self.parameters
@@ -44,4 +59,4 @@ class _OnMass(Occupant):
 
 
 EFFECT = Occupant()
-EFFECT.variants = {"single_mass": _OnMass()}
+EFFECT.variants = {"quarter_car": _AtCentre(), "component": _AtCentre(), "single_mass": _OnMass()}
