@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from logger.plugins import catalogue
+from logger.store.formats.effect_file import shipped_effects
 
 from ..support.slow import slow
 from .cases import random_case as cases
@@ -41,7 +42,7 @@ def test_every_effect_off_the_list_has_a_family_and_every_meaning_a_name() -> No
 
 def test_every_family_has_a_meaning() -> None:
     assert catalogue("logger.lab.laws.families", "FAMILY").keys() == (
-        set().union(*NAMES.values()) - {REMOVED_DRIFT, "hysteresis", "maxwell_element"})
+        set().union(*NAMES.values()) - {REMOVED_DRIFT} - shipped_effects().keys())
 
 
 def test_a_sensor_that_drifts_is_said_and_needs_no_law() -> None:

@@ -20,7 +20,7 @@ MASS_KG, RATIO = 6.0, 0.12
 
 def at_wheels(frequency_hz: float) -> Chosen:
     posterior = posterior_of(secret_runs())
-    draft = next(one for one in FAMILY.drafts(LawContext(posterior, posterior.start())) if one.variant == "wheels")
+    (draft,) = FAMILY.drafts(LawContext(posterior, posterior.start()))
     return chosen(draft.effect, {"mass_kg": MASS_KG, "frequency_hz": frequency_hz, "damping_ratio": RATIO})
 
 

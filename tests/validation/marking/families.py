@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 BY_TRAVEL, BY_RATE, BY_BOTH, BY_TIRE = "force by travel", "force by rate", "damping by travel", "force by the tire"
 FRICTION, RUBBER, PLAY, HEAT = "friction", "spring with memory", "play", "fading by heat"
-MASS, CORRECTION, REPEATS = "mass on a spring", "body to record", "repeats"
+MASS, ON_BODY, CORRECTION, REPEATS = "mass on a spring", "mass on the body", "body to record", "repeats"
 DRIFT, CHANGE = "sensor drift", "number that changes"
 PROFILE, INERTIA = "profile that lacks waves", "inertia in the suspension"
 STOP = "stop"
@@ -30,6 +30,7 @@ NAMES: dict[str, frozenset[str]] = {
     PLAY: frozenset({"damper_backlash", "sliding_behind_spring"}),
     HEAT: frozenset({"damper_heat"}),
     MASS: frozenset({"hung_mass"}),
+    ON_BODY: frozenset({"occupant"}),
     CORRECTION: frozenset({"record_factor", "clipping", "loose_sensor"}),
     REPEATS: frozenset({"hum", "wheel_turns", "flat_spot"}),
     DRIFT: frozenset({REMOVED_DRIFT}),
@@ -58,7 +59,7 @@ RIGHT: dict[str, Right] = {
     "engine_vibration": Right((REPEATS,), "a line in time"),
     "damper_fading": Right((CHANGE, HEAT), "the damping changes with time, as if it warmed"),
     "rubber_spring": Right((RUBBER,), "a Maxwell branch"),
-    "trailer": Right((MASS,), "a mass on a spring behind the rear axle"),
+    "trailer": Right((ON_BODY,), "a mass on a spring behind the rear axle"),
     "clipping": Right((CORRECTION,), "of the sensor's reading alone"),
     "gain_drift": Right((CHANGE, DRIFT), "the gain is a number that was taken for fixed, and it is the sensor's"),
     "blurred_profile": Right((PROFILE,), "the profile lacks short waves; the record itself is as it should be"),

@@ -21,7 +21,7 @@ NEAR = 1.1
 _SHARE, _DEVIATIONS = 0.10, 3.0
 _FROM_ONE = ("gain", "scale", "rebound_to_bump_ratio")
 _NAME_ONLY = ("roll",)  # what is linear moves a sensor on the centre line alike for any track width
-_BY_NOW = {"bushing_hysteresis": "hysteresis", "quadratic_damping": "orifice_damping"}
+_BY_NOW = {"bushing_hysteresis": "hysteresis", "quadratic_damping": "orifice_damping", "trailer": "occupant"}
 CLASSES = (("below 1", 0.0, 1.0), ("1 to 3", 1.0, 3.0), ("above 3", 3.0, float("inf")))
 
 NOTHING, UNEXPLAINED, FAILED = "nothing", "unexplained", "no answer"
