@@ -555,21 +555,23 @@ def iri_errors(knowledge: CarKnowledge, x: Array, covariance: Array, speeds_mps:
     found = []
     for speed in speeds_mps:
         own = reading_power(knowledge, x, speed)
-        ratios = [iri_ratio(own, reading_power(knowledge, one, speed), speed, noise, level) for one in cars]
+        others = np.array([reading_power(knowledge, one, speed) for one in cars])
+        ratios = iri_ratio(own, others, speed, noise, level)
         found.append(np.sqrt(np.mean(np.log(ratios) ** 2)))
     return np.array(found)
 
 
-def iri_ratio(estimating: Array, actual: Array, speed_mps: float, noise: float, level: float) -> float:
-    """IRI that an estimator with one car's gains finds on a road, over what is right, where the readings come from
-    another.
+def iri_ratio(estimating: Array, actual: Array, speed_mps: float, noise: float, level: float) -> Array:
+    """IRI (...) that an estimator with one car's gains finds on a road, over what is right, where the readings come
+    from another.
 
     Problem: what a wrong gain does to an IRI is not its mean error, as waves that a car does not feel are filled in by
     the road's spectrum, whose level is learned with the same wrong gain. Solution: the estimator's filter (N. Wiener's,
     with the level that fits the readings' power best) is applied to the spectrum that the other car reads; the IRI is
     proportional to the root of the power of the slope that comes out, the posterior variance included.
 
-    estimating, actual    squared gains (n,) from road to reading at ``WAVE_NUMBERS_CPM`` [1/s4]; of waves that pass
+    estimating, actual    squared gains (n,) and (..., n) from road to reading at ``WAVE_NUMBERS_CPM`` [1/s4]; of waves
+                          that pass
     noise                 spectrum of the readings' noise [m2/s4 per Hz]
     level                 of the road, Gd(0.2 cycle/m) [m3]
     """
@@ -579,15 +581,15 @@ def iri_ratio(estimating: Array, actual: Array, speed_mps: float, noise: float, 
     within = n * speed_mps < HIGHEST_HZ
     noise = noise * speed_mps
     read = np.where(within, actual, 0.0) * road + noise
-    factor = 1.0
+    factor = np.ones((*actual.shape[:-1], 1))
     for _ in range(30):
         known = np.where(within, estimating, 0.0) * road * factor
         weight = (known / (known + noise)) ** 2 * steps
-        factor *= float((weight * read / (known + noise)).sum() / weight.sum())
+        factor *= (weight * read / (known + noise)).sum(axis=-1, keepdims=True) / weight.sum(axis=-1, keepdims=True)
     known = np.where(within, estimating, 0.0) * road * factor
     share = known / (known + noise)
     found = factor * (share * read / (known + noise) + 1 - share)
-    return float(np.sqrt((slope * found).sum() / slope.sum()))
+    return np.asarray(np.sqrt((slope * found).sum(axis=-1) / slope.sum()))
 
 
 def reading_power(knowledge: CarKnowledge, x: Array, speed_mps: float) -> Array:
