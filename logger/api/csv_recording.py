@@ -446,7 +446,7 @@ def _fixes(tables: _Tables, asked: CsvSettings, config: Config, origin_s: float,
     inside = (found.time_s >= span_s[0] - 1.0) & (found.time_s <= span_s[1] + 1.0)
     if np.count_nonzero(inside) < 2:
         said = "none" if not len(found.time_s) else (
-            f"those from {found.time_s[0]:.6g} to {found.time_s[-1]:.6g} s beside accelerations from {span_s[0]:.6g} "
+            f"fixes from {found.time_s[0]:.6g} to {found.time_s[-1]:.6g} s and accelerations from {span_s[0]:.6g} "
             f"to {span_s[1]:.6g} s")
         raise BadInput(f"{table.header.path}: expected fixes by the clock of {path.name}, in the same period, found "
                        f"{said}")
@@ -501,7 +501,7 @@ def _speed_scale(table: LoggerTable) -> float:
     unit = table.unit("speed")
     if unit is None:
         column = table.known.columns["speed"].header
-        raise BadInput(f"{table.header.path}:{table.header.line}: expected to know the unit of the speed {column}: "
+        raise BadInput(f"{table.header.path}:{table.header.line}: expected a unit of the speed {column}, found none: "
                        f"give speed={column}:UNIT in --columns, one of {', '.join(SPEED_UNITS)}")
     return SPEED_UNITS[unit]
 

@@ -234,7 +234,8 @@ def _of_logs(source: drive_file.Drive | Path | str) -> list[_Used] | None:
             raise BadInput(f"{log}: its sidecar cannot be used: {error}: leave the log out") from None
     if logs and not found:
         raise BadInput(f"{path}: expected logs whose sidecars keep spectra of the drives, found none in "
-                       f"{counted(len(logs), 'file')}: they are kept from this version on; give dumps of older drives")
+                       f"{counted(len(logs), 'file')}: older versions of ridelog kept none; give the dumps of these "
+                       "drives")
     return list(found.values()) or None
 
 

@@ -191,7 +191,7 @@ class IngestQuestion(LogsQuestion):
     (DATASET.cars.csv) its name.
 
       ridelog fleet ingest depot/ --to county --car-folders
-      ridelog fleet ingest /media/RIDELOG --to county --car "van 7" --trim-m 200
+      ridelog fleet ingest /media/RIDELOG --to trimmed --car "van 7" --trim-m 200
 
     In Python: raises BadInput for no log, a log without a car's name, a folder that is no dataset, and other roads or
     another ``trim_m`` than the dataset has; OSError for a disk that refuses.

@@ -132,7 +132,7 @@ class Comfort(CommandResult):
         return [
             Curves("Running r.m.s. over 1 s", "time [s]", "weighted acceleration [m/s2]",
                    (line("running r.m.s.", time_s, running),), (self.a_w_mps2, "a_w")),
-            Curves("Spectrum of the weighted acceleration", "frequency [Hz]", "PSD [(m/s2)2/Hz]",
+            Curves("Spectrum of the weighted acceleration", "frequency [Hz]", "power spectral density [(m/s2)2/Hz]",
                    (Line("weighted", frequency_hz[shown], np.maximum(psd[shown], np.finfo(float).tiny)),),
                    log_x=True)]
 
@@ -269,8 +269,9 @@ def blocks(result: RideComfort, name: str) -> Iterator[Block]:
     yield Lines(conclusions)
     yield Lines([f"Method: {METHOD}; the mean is removed."])
     if result.unseen_from_hz is not None:
-        yield Lines([f"The record cannot show what lies above {result.unseen_from_hz:.4g} Hz. The standard counts it "
-                     f"up to {result.weighting.counts_up_to_hz:g} Hz; the values cover only what was recorded."])
+        yield Lines([f"The record cannot show what lies above {result.unseen_from_hz:.4g} Hz. The standard counts "
+                     f"frequencies up to {result.weighting.counts_up_to_hz:g} Hz; the values cover only what was "
+                     "recorded."])
     if result.left_out:
         yield Lines(["Other axes are combined only with Wk, x and y together; left out."])
 

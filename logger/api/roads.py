@@ -199,8 +199,8 @@ class RoadClass(CommandResult):
         lines += [Line(f"{smoother} | {rougher}", ends, displacement_psd(ends, mean_cm3 / 2), faint=True)
                   for smoother, (rougher, mean_cm3) in zip(CLASS_GD_N0_CM3, list(CLASS_GD_N0_CM3.items())[1:],
                                                            strict=False)]
-        return [Curves("Spectrum of the road", "wave number [cycles/m]", "displacement PSD [m3]", tuple(lines),
-                       log_x=True, log_y=True)]
+        return [Curves("Spectrum of the road", "wave number [cycles/m]", "displacement power spectral density [m3]",
+                       tuple(lines), log_x=True, log_y=True)]
 
 
 @function(ClassifyQuestion)

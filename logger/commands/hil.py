@@ -109,7 +109,8 @@ class PlayedDrive:
         """For a person."""
         lines = []
         if self.bridged:
-            lines.append(f"The readings of the {self.bridged} go out as lines x,y,z in g: no port can replace its bus.")
+            lines.append(f"The readings of the {self.bridged} go out as lines x,y,z in g: a serial port cannot replace "
+                         "its I2C bus.")
         if self.sent is not None:
             size = ", ".join(f"{count} bytes of {source}" for source, count in self.sent.size_bytes.items())
             half, most, longest = self.sent.late_ms

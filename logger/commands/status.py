@@ -113,8 +113,8 @@ def _storage_advice(storage: StorageStatus) -> list[str]:
         steps.append(f"Raw bytes: not recorded: {storage.recording_trouble}. Export the dumps and delete them, or set "
                      "record_dump: false.")
     if storage.dumps_lost:
-        steps.append(f"Raw bytes: {storage.dumps_lost} dumps were removed, unexported, to make room for logs. Export "
-                     "more often, or set record_dump: false.")
+        steps.append(f"Raw bytes: ridelog removed {storage.dumps_lost} dumps before their export, to make room for "
+                     "logs. Export more often, or set record_dump: false.")
     if storage.notices:
         steps += [f"Log folder: {words}." for words in storage.notices]
         steps.append("Log folder: copy the logs away, look at the files that end in .aside and delete them; if more "

@@ -271,7 +271,7 @@ def _fitted(row: Array, paths: list[_Path], data_bits: int) -> tuple[float, Fixe
     largest_sum = math.ceil(_bound(paths)) * sum(map(abs, b)) + largest_output * recursion + carry
     too_large = largest_output > largest_word(data_bits) or largest_sum > largest_word(64)
     if too_large or max(map(abs, b)) > largest_word(32):
-        raise ValueError(f"expected a section that a scale fits, not b, a1, a2 = {b}, {a} / 2^30")
+        raise ValueError(f"expected a section that some scaling keeps from overflow, not b, a1, a2 = {b}, {a} / 2^30")
     return gain, FixedSection(b, a, largest_output, largest_sum), reached
 
 
@@ -299,7 +299,7 @@ def _rounding(a: tuple[int, int], samples: int) -> list[_Path]:
     impulse = _impulse(samples)
     recursion = (0.5 / UNIT, _response((UNIT, 0, 0), a, impulse))
     if _bound([recursion]) >= 0.5:
-        raise ValueError(f"expected a section that falls silent in 32-bit coefficients, not a1, a2 = {a} / 2^30")
+        raise ValueError(f"expected a section that decays to zero with 32-bit coefficients, not a1, a2 = {a} / 2^30")
     return [recursion, (0.5, impulse)]
 
 

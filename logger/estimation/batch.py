@@ -353,7 +353,7 @@ def _check_way(distance_m: Array, longest_m: float) -> None:
     jump = np.diff(distance_m, prepend=distance_m[0]) > longest_m + BACK_M
     if (wrong := back | jump).any():
         row = int(np.argmax(wrong))
-        limit = (f"at most {BACK_M:g} m before the farthest yet, {distance_m[:row].max():.10g} m" if back[row]
+        limit = (f"no more than {BACK_M:g} m below the largest so far, {distance_m[:row].max():.10g} m" if back[row]
                  else f"at most {longest_m + BACK_M:.4g} m after {distance_m[row - 1]:.10g} m")
         raise Unusable(f"expected a distance {limit}, found {distance_m[row]:.10g}", row)
 

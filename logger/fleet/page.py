@@ -408,7 +408,7 @@ def _cars(figures: FleetFigures) -> doc.Html:
     rows = [(figures.names[one], f"{biases.gain[one] - 1.0:+.1%} ± "
              f"{biases.gain[one] * biases.log_std[one]:.1%}" if biases.known[one] else "not known",
              f"{figures.car_passes[one]:,.0f}") for one in order]
-    return doc.section("Cars", doc.grid(("Car", "Reads", "Passes"), rows) + doc.hint(not_known(figures) or (
+    return doc.section("Cars", doc.grid(("Car", "Bias", "Passes"), rows) + doc.hint(not_known(figures) or (
         "Bias of a car on the roads that it shares with others, relative to the average car; the figures above are "
         "corrected for it. Cars that differ from the average car come first.")))
 

@@ -403,7 +403,7 @@ def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: S
         if why is None and all({one.kind, one.measures} & set(effect.not_of) for one in sensors):
             why = f"no {' or '.join(sorted({one.kind or f'sensor of {one.measures}' for one in sensors}))} has it"
         if why is None and all(one.measures in effect.found_of for one in sensors):
-            why = f"of a {' or '.join(sorted({one.measures for one in sensors}))} it is always estimated"
+            why = f"the scale of a {' or '.join(sorted({one.measures for one in sensors}))} is always estimated"
         if why is None and isinstance(effect, SensorEffect) and all(run.past is Past.FREE for run in runs):
             why = "nothing drives the run: another initial state would look the same as this sensor effect"
         if why is None and effect.against_ground and at_rest:

@@ -79,7 +79,7 @@ def find_modes(samples: Array, rate_hz: float, inputs: Array | None = None, deca
     how = (f"response to unmeasured random forces: {METHODS['ssi']}" if inputs is None else
            f"response beside its measured input: {METHODS['n4sid']}")
     if chosen == 0:
-        return ModalResult((), (), 0, f"{how}; no model explains more than its parameters cost")
+        return ModalResult((), (), 0, f"{how}; no model gains more evidence than its parameters cost")
     place = plan.orders.index(chosen)
     thinned = plan.orders[place::-(place // diagram_orders + 1)][::-1]
     diagram = plan.models(moments, thinned + plan.orders[place + 1:place + 1 + _BEYOND])
@@ -167,7 +167,7 @@ def _excitation(inputs: Array, rate_hz: float, lags: int) -> int:
         strongest_hz = float(power.argmax()) * rate_hz / len(inputs)
         raise ValueError(
             f"expected an input with many frequencies, found {(count + 1) // 2} (the strongest {strongest_hz:.3g} Hz): "
-            f"its order of excitation is {count}, and one mode takes persistent excitation of order {one_mode}. Drive "
+            f"its order of excitation is {count}, and one mode needs persistent excitation of order {one_mode}. Drive "
             "the structure with a sweep or noise, or leave the input out")
     return count
 

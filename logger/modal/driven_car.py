@@ -277,6 +277,6 @@ def car_modes(vehicle: Vehicle, samples: Array, speed_mps: Array, usable: Bools,
     worst = int(np.abs(fit.measured_share - 1).argmax())
     how = (f"drive on roads that nobody measured: springs, dampers and masses of {vehicle.name} fitted to the spectra "
            f"of {len(pieces.power)} stretches of {_PIECE_S:g} s. Removed: the road (waviness {fit.waviness:.2f}) "
-           f"and the distance between the axles. Power off by {abs(fit.measured_share[worst] - 1):.0%} at most, "
-           f"from {fit.bands_hz[worst]:.2g} Hz")
+           f"and the distance between the axles. The fitted power is at most "
+           f"{abs(fit.measured_share[worst] - 1):.0%} off, in the band from {fit.bands_hz[worst]:.2g} Hz on")
     return ModalResult(tuple(modes), tuple(rejected), 0, how)

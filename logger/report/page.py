@@ -246,8 +246,8 @@ def _sensor_note(sensor: Any) -> str:
     name = " ".join(str(sensor[key]) for key in ("driver", "profile", "profile_version") if key in sensor)
     if sensor.get("verified") is True:
         return f"Sensor: {name}"
-    return f"Sensor: {name}. " + _warning("What its bytes mean is not verified on hardware: do not rely on any value "
-                                          "here.")
+    return f"Sensor: {name}. " + _warning("Nobody has verified on hardware what its bytes mean: do not rely on any "
+                                          "value here.")
 
 
 def _settings_section(files: Sequence[LoggedFile]) -> doc.Html:

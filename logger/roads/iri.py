@@ -357,6 +357,7 @@ UNITS_M = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "km": 1e3, "in": FOOT_M / 12, "ft":
 DOUBTFUL_M_PER_KM = 100.0
 """No road that a car can drive on is as rough, and no limit that is looked for is half as high."""
 ROUGHEST_M_PER_KM = iri_from_gd_n0(2 * CLASS_GD_N0_CM3["H"])  # Upper limit of class H: twice its geometric mean
+_WORDS = {"in": "inches", "ft": "feet"}
 HIGHEST_LIMIT_M_PER_KM = 0.5 * DOUBTFUL_M_PER_KM
 _FINEST_M = 1e-3  # No profiler samples more densely; 0.3 m apart are 0.0003 km
 
@@ -364,7 +365,7 @@ _FINEST_M = 1e-3  # No profiler samples more densely; 0.3 m apart are 0.0003 km
 def unit_doubt(iri_m_per_km: float) -> str:
     """What is to be said of a profile with this IRI that is rougher than any road; else nothing."""
     return "" if iri_m_per_km <= DOUBTFUL_M_PER_KM else (
-        f"Elevation in {_likely(iri_m_per_km)[0]}? An IRI of {iri_m_per_km:.4g} m/km is more than any road has"
+        f"Elevation in {_word(_likely(iri_m_per_km)[0])}? An IRI of {iri_m_per_km:.4g} m/km is more than any road has"
         f"{_in_others(iri_m_per_km)}; expected elevation_m in metres.")
 
 
@@ -395,9 +396,9 @@ def unit_complaint(elevation_m: Array, spacing_m: float) -> str:
         if found <= ROUGHEST_M_PER_KM:
             return ""
         unit = _likely(found)[0]
-        return (f"expected elevations in m. Elevation in {unit}? By its IRI of {found:.4g} m/km, more than any road "
-                f"has{_in_others(found)}, the profile seems to be in {unit}: name the column by its unit, as "
-                f"elevation_{unit}, or write metres")
+        return (f"expected elevations in m. Elevation in {_word(unit)}? By its IRI of {found:.4g} m/km, more than any "
+                f"road has{_in_others(found)}, the profile seems to be in {_word(unit)}: name the column by its unit, "
+                f"as elevation_{unit}, or write metres")
     slope = float(np.abs(np.diff(elevation_m)).mean()) / spacing_m
     return "" if slope <= steepest else (
         f"expected elevations in m, found a mean slope of {100 * slope:.4g} %, more than any road has. Elevation in "
@@ -408,7 +409,8 @@ def spacing_hint(spacing_m: float) -> str:
     """The unit that distances so far apart have if they are a profiler's; nothing where none fits."""
     likely = [unit for unit in ("mm", "cm", "in", "ft")
               if spacing_m > COARSEST_SPACING_M >= spacing_m * UNITS_M[unit] >= _FINEST_M]
-    return f" (in {' or '.join(likely)}? Name the column by its unit, as distance_{likely[0]})" if likely else ""
+    words = " or ".join(map(_word, likely))
+    return f" (in {words}? Name the column by its unit, as distance_{likely[0]})" if likely else ""
 
 
 def likely_unit(by_speed_m: float, by_distance_m: float) -> str:
@@ -436,5 +438,9 @@ def _likely(iri_m_per_km: float) -> list[str]:
     return [unit for unit in ("mm", "cm", "in") if low <= iri_m_per_km * UNITS_M[unit] <= high] or ["mm"]
 
 
+def _word(unit: str) -> str:
+    return _WORDS.get(unit, unit)
+
+
 def _in_others(iri_m_per_km: float) -> str:
-    return f" ({', '.join(f'{iri_m_per_km * UNITS_M[unit]:.3g} in {unit}' for unit in _likely(iri_m_per_km))})"
+    return f" ({', '.join(f'{iri_m_per_km * UNITS_M[unit]:.3g} in {_word(unit)}' for unit in _likely(iri_m_per_km))})"

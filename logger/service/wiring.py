@@ -214,7 +214,8 @@ def notices(config: Config, model: CarModel, sensor: Instrument) -> tuple[str, .
     if vehicle.sensor.left_m:
         side = "left" if vehicle.sensor.left_m > 0 else "right"
         found.append(f"vehicle {vehicle.name}: the sensor sits {abs(vehicle.sensor.left_m):g} m {side} of the middle "
-                     "(sensor.left_m): roll is not corrected, it reads as roughness. Mount it in the middle.")
+                     "(sensor.left_m): ridelog does not correct for roll, which reads as roughness. Mount it in the "
+                     "middle.")
     if vehicle.name == GENERIC:
         missing = "" if config.wheelbase_m is not None else " Until then, give its wheelbase there (wheelbase_m)."
         found.append(f"vehicle: {not_known(iri_share_std(model, sensor))}{missing}")

@@ -78,8 +78,8 @@ def known_car(car: Car) -> KnownCar:
     ValueError for a law that is another one at another place or time, and for effects on the record in time.
     """
     if car.records:
-        raise ValueError(f"{car.records[0].effect.name} acts on the record over time and has no linear stand-in: "
-                         "expected effects without it here")
+        raise ValueError(f"{car.records[0].effect.name} acts on the record over time, so it cannot be linearised: "
+                         "leave it out here")
     output = Output(car.row, np.zeros(len(car.structure.wheels)), 2)
     if not car.bends_laws:
         return LinearCar(car.structure, output, sensors=car.sensors)
@@ -288,8 +288,8 @@ def _check_steady(law: MotionLaw) -> None:
     for asked in (one for one in (law.force, law.rates) if one is not None):
         here, there = (asked(law.p, Seen._make([*motions, *at, memory])) for at in ((0.0,) * 4, _ELSEWHERE))
         if not np.array_equal(here, there):
-            raise ValueError("a force that depends on the place or the time has no linear stand-in: expected effects "
-                             "without one here")
+            raise ValueError("a force that depends on the place or the time cannot be linearised: leave its effect out "
+                             "here")
 
 
 def _motions(moves: Waves, s: Complex, i: int) -> Complex:

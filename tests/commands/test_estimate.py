@@ -412,8 +412,8 @@ def test_files_that_will_not_do(folder: Path, tmp_path: Path) -> None:
     back[700:] -= 3.0
     jump[700:] += 9.0
     fast[10], wild[20] = 151.0, 2e6
-    assert refused(distance_m=back) == (f":702: expected a distance at most 1 m before the farthest yet, "
-                                        f"{back[699]:.10g} m, found {back[700]:.10g}")
+    assert refused(distance_m=back) == (f":702: expected a distance no more than 1 m below the largest so "
+                                        f"far, {back[699]:.10g} m, found {back[700]:.10g}")
     assert refused(distance_m=jump) == (f":702: expected a distance at most 2.5 m after {jump[699]:.10g} m, "
                                         f"found {jump[700]:.10g}")
     assert refused(speed_mps=fast) == ":12: expected speed_mps within 150 m/s, found 151"

@@ -89,7 +89,7 @@ def test_commands(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bare = tmp_path / "bare.csv"
     bare.write_text("\n".join(line.rsplit(",", 2)[0] for line in Path(file).read_text().splitlines()) + "\n")
     assert main(["modes", file, "--vehicle", "golden-car"]) == 0
-    assert "and the distance between the axles. Power off by" in capsys.readouterr().out
+    assert "and the distance between the axles. The fitted power is at most" in capsys.readouterr().out
     assert main(["modes", str(bare), "--vehicle", "golden-car", "--speed", "20"]) == 0
     assert len(modes_in_python(tmp_path / "run", vehicle="golden-car").frequency_hz) == 2
     for arguments, words in (

@@ -120,8 +120,8 @@ def test_what_calibrated_sensors_may_leave_above_their_noise_is_said_too() -> No
     assert left == ("In the worst run the residual is 1.5 times the sensor's noise. Beyond that noise it is less than "
                     "0.1% of the measured power: calibration errors of the sensors may leave as much.")
     _, other, *_ = diagnosis_summary(replace(FOUND, over_noise=9.0, proportional=0.1))
-    assert other.endswith("may leave as much, but most of this is not proportional to the motion, as theirs would be: "
-                          "something small may be missing.")
+    assert other.endswith("may leave as much. But those grow in proportion to the motion, and most of this residual "
+                          "does not: something small may be missing.")
     nothing, as_much, *_ = diagnosis_summary(replace(NOTHING, over_noise=0.5))
     assert nothing.endswith("the residual is hardly more than calibration errors of the sensors.")
     assert as_much == left
@@ -134,7 +134,7 @@ def test_what_no_candidate_explains_is_said_and_so_are_imitations_that_are_not_n
                     "sensor's noise. Beyond that noise it is less than 0.1% of the measured power.")
     imitating = replace(found, candidates=(candidate("tire_damping", 1e-5, 40.0), *OTHERS[1:]))
     _, imitation, _ = diagnosis_summary(imitating)
-    assert imitation.startswith("ridelog names no effect that gains less than 10% of what a full explanation would")
+    assert imitation.startswith("ridelog does not name an effect that gains less than 10% of what a full ")
 
 
 def test_numbers_outside_their_tolerance_are_named_with_how_far_they_are_off() -> None:
@@ -206,8 +206,8 @@ def test_what_explains_as_well_is_named_with_the_drives_that_would_separate_them
 def test_what_is_nearly_named_is_said_with_the_drive_that_would_show_it() -> None:
     near = candidate("sensor_gain", 0.008, 15.6)
     *_, said = diagnosis_summary(replace(NOTHING, candidates=(near, OTHERS[0])))
-    assert said == ("sensor_gain just misses the threshold: noise alone looks like it in 0.8% of such searches, "
-                    f"and ridelog allows 0.1%. To find out: {EFFECTS['sensor_gain'].shown_by}.")
+    assert said == ("sensor_gain just misses the threshold: in 0.8% of such searches noise alone looks like it; "
+                    f"ridelog allows 0.1%. To find out: {EFFECTS['sensor_gain'].shown_by}.")
     assert not any("misses the threshold" in one for one in (*diagnosis_summary(NOTHING), *diagnosis_summary(FOUND)))
 
 

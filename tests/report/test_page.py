@@ -136,7 +136,7 @@ def test_hostile_text_stays_text(drive) -> None:
 def test_a_sensor_nobody_has_verified_is_said_so(drive) -> None:
     unverified = {**SIDECAR, "sensor": {"driver": "pasco", "profile": "ps2119", "verified": False}}
     text = text_of(page([LoggedFile("a.csv", drive(3), 0, unverified)]))
-    assert "Sensor: pasco ps2119 . What its bytes mean is not verified" in text.replace("ps2119.", "ps2119 .")
+    assert "Sensor: pasco ps2119 . Nobody has verified on hardware" in text.replace("ps2119.", "ps2119 .")
     assert "Logs without a sidecar (.json): a.csv" in text_of(page([LoggedFile("a.csv", drive(3), 0, None)]))
 
 

@@ -82,7 +82,7 @@ def test_inches_are_doubted_and_no_more(tmp_path: Path, capsys: pytest.CaptureFi
     for command in (["iri", file], ["road", "classify", file]):
         assert main(command) == 0
         assert "is more than any road has" in capsys.readouterr().out
-    assert "in cm? An IRI of 160 m/km is more than any road has (1.6 in cm, 4.06 in in)" in unit_doubt(160.0)
+    assert "in cm? An IRI of 160 m/km is more than any road has (1.6 in cm, 4.06 in inches)" in unit_doubt(160.0)
     assert unit_doubt(24.0) == ""
 
 

@@ -215,7 +215,7 @@ def test_a_sensor_beside_the_middle_line_is_reported(start: Callable[[], Service
     service = start()
     notice = service.wait_for(lambda status: True)["notices"][0]
     assert "0.3 m right of the middle" in notice
-    assert "roll is not corrected" in notice
+    assert "does not correct for roll" in notice
     assert service.terminate() == 0
     assert service.errors.read_text().count(notice) == 1
 

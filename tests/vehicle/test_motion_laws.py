@@ -460,7 +460,7 @@ def test_modes_ring_as_the_waves_do() -> None:
 
 def test_a_law_of_place_or_time_has_no_stand_in(tmp_path: Path) -> None:
     text = "def push(p, seen):\n    return p.size * np.sin(seen.time_s) + 0.0 * seen.travel_m\n"
-    with pytest.raises(ValueError, match="no linear stand-in"):
+    with pytest.raises(ValueError, match="cannot be linearised"):
         known_vehicle(RIG, [own(tmp_path, text, "Between.BODY_AND_GROUND, push, p")])
 
 

@@ -82,9 +82,9 @@ def lira_map(folder: Path, effort: Workload) -> Result:
                f"values for cells up to 5 m apart. Two passes differ by up to {off_m_per_km[0]:.2f} and "
                f"{off_m_per_km[1]:.2f} m/km (r.m.s.). No car can be shown to be more accurate than that against one "
                "pass: it is the ceiling of every comparison on real roads. The figures of 0.85 per 10 m and 0.955 per "
-               "100 m that are quoted for these files are squared correlations, which a pass that reads 4 % more does "
-               "not lower. They follow after each stretch of road was moved by up to 4 m to where it fits best. "
-               f"Computed like that, they are {squared[0]:.3f} and {squared[1]:.3f} here on average over the "
+               "100 m that are quoted for these files are squared correlations, which stay the same if a pass reads "
+               "4 % more. They follow after each stretch of road was moved by up to 4 m to where it fits best. "
+               f"Computed in this way, they are {squared[0]:.3f} and {squared[1]:.3f} here on average over the "
                "three pairs; moving so many pieces also fits some of the noise.")
     return Result((*tables, length), verdict, (Picture(_picture(passes)),))
 

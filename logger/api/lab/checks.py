@@ -267,8 +267,8 @@ def _other_units_on_rig(runs: SimulatedRuns, rig: LikeliestRig | None) -> Iterat
         nearest = min((size for _, _, size in sizes), key=lambda size: abs(log(gain / size)))
         likely = " or ".join(f"{name} in {unit}" for name, unit, size in sizes
                              if abs(size / nearest - 1) < _NEAR and abs(log(gain / nearest)) < log(_APART))
-        yield (f"{run.name}: expected N, m and m/s2, found {main.name} {gain:.3g} times the reading of any rig "
-               "that the vehicle's file allows: "
+        yield (f"{run.name}: expected N, m and m/s2, found {main.name} {gain:.3g} times as large as any rig "
+               "within the vehicle's file would give: "
                + (f"it looks like {likely}" if likely else "is a column in another unit?"))
 
 

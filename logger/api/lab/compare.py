@@ -31,7 +31,18 @@ from logger.printable import counted
 from logger.question import function
 from logger.report import document as doc
 from logger.report.blocks import SHOWN_ROWS, Block, Blocks, Bullets, Detail, Hint, Linked, Section, Table, page
-from logger.report.quantities import chance, finite, fixed, known, numbers_of, signal_errors, some, unit_of
+from logger.report.quantities import (
+    FEW,
+    chance,
+    enumerated,
+    finite,
+    fixed,
+    known,
+    numbers_of,
+    signal_errors,
+    some,
+    unit_of,
+)
 from logger.runs import Run, are_on_rig, normalised_rms_error, runs_left_out, short_names
 from logger.store.formats import vehicle_file
 from logger.vehicle.effect import Chosen, Effect
@@ -232,7 +243,7 @@ def conclusion(found: LabComparison) -> str:
         return ("The model lacks no effect of the car. The residual (measured - model) does not depend on the road; it "
                 "looks like coloured noise of the sensor or the engine.")
     removed = found.removed.drifting_sensors or found.removed.distance_error_m > 0
-    beside = " beside what is removed below" * bool(removed)
+    beside = " apart from what was removed, as shown below," * bool(removed)
     return f"The model lacks nothing{beside}: after a refit, the residual (measured - model) is no more than noise."
 
 
@@ -552,7 +563,8 @@ def bias(names: Sequence[str], moved: Sequence[ShiftedNumber]) -> str:
     biased = [one for one in moved if one.biased]
     if not biased:
         return f"{together} moved no parameter of the model by more than {BIAS_SIGMA:g} standard errors."
-    listed = some([one.name for one in biased])
+    own = [one.name for one in biased]
+    listed = some(own) if len(own) > FEW else enumerated(own, "and")
     worst = biased[0]
     too_much = (f"{_change(worst.name, worst.found, worst.without)[1:]} too "
                 f"{'high' if worst.without > worst.found else 'low'}")

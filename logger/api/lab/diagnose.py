@@ -298,11 +298,12 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
             lines.append(f"It appears only in {enumerated(found.contradicted_by, 'and')}; the model explains the other "
                          "signals down to their noise. Check that sensor's position, sign and filter.")
         if any(one.p_value < FALSE_ALARM and one.effect.name not in found.verdict for one in found.candidates):
-            lines.append(f"ridelog names no effect that gains less than {IMITATION:.0%} of what a full explanation "
-                         "would: it may only imitate what is missing.")
+            lines.append(f"ridelog does not name an effect that gains less than {IMITATION:.0%} of what a full "
+                         "explanation would gain: it may only imitate what is missing.")
     elif found.within_calibration:
         of_motion = "." if found.mostly_proportional else (
-            ", but most of this is not proportional to the motion, as theirs would be: something small may be missing.")
+            ". But those grow in proportion to the motion, and most of this residual does not: something small may be "
+            "missing.")
         lines.append(f"In the worst run the residual is {_left_over(found)}: calibration errors of the sensors may "
                      f"leave as much{of_motion}")
     lines += [f"{name} is {share:+.1%} off against all other signals, more than a calibration error: check its scale "
@@ -401,7 +402,8 @@ def _missing(found: LabDiagnosis, one: Chosen) -> str:
     name, numbers = one.effect.name, f": {numbers_of(one)}" if one.values else ""
     candidate = found.candidate(name)
     likely = f"{P_VALUE} {chance(candidate.p_value)}."
-    if name in found.ends:
+    alike = [other for other in found.verdict if found.ends.get(other) == found.ends.get(name)]
+    if name in found.ends and name == alike[-1]:  # said once of effects with the same counts
         there, count = found.ends[name]
         likely += f" The model's parameters were unknown; {there} of {count} starting points led to this result."
     says = "explains part of the residual, or imitates something else" if found.may_imitate(name) else "is missing"
@@ -419,8 +421,8 @@ def _faint(found: LabDiagnosis) -> list[str]:
     nearest = min(others, key=lambda one: one.p_value, default=None)
     if found.unexplained or nearest is None or not FALSE_ALARM <= nearest.p_value < _SUSPECT:
         return []
-    return [f"{nearest.effect.name} just misses the threshold: noise alone looks like it in {percent(nearest.p_value)} "
-            f"of such searches, and ridelog allows {percent(FALSE_ALARM)}. To find out: {nearest.effect.shown_by}."]
+    return [f"{nearest.effect.name} just misses the threshold: in {percent(nearest.p_value)} of such searches noise "
+            f"alone looks like it; ridelog allows {percent(FALSE_ALARM)}. To find out: {nearest.effect.shown_by}."]
 
 
 def _confusion(names: list[str], found: LabDiagnosis) -> str:

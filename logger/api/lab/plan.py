@@ -133,7 +133,8 @@ def _longest_road(bench: Bench | None) -> Track | None:
 
 
 _MOST_NEXT = 5
-SENSOR_HINT = "Assumed noise: a second accelerometer like the first, a travel sensor 0.5 mm, a gyroscope 0.001 rad/s."
+SENSOR_HINT = ("Assumed noise: a second accelerometer as noisy as the first, a travel sensor 0.5 mm, a gyroscope 0.001 "
+               "rad/s.")
 _OBSTACLES = {"bump": "a speed bump {height_m:g} m high and {width_m:g} m long",
               "plate": "a plank {height_m:g} m high and {length_m:g} m long"}
 _SENSES = {"acceleration": "an accelerometer on", "travel": "a travel sensor at", "pitch_rate": "a pitch gyroscope on"}

@@ -277,8 +277,8 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
     agreements = road_agreements(problem, nominal, [chosen(one, values) for one in tried for values in one.trials()])
     if found := certain_two_roads(agreements):
         one, other = (problem.runs[run].name for run in found)
-        raise NotOneRoad(f"{one} and {other}: expected drives over the same road, found that neither predicts what the "
-                         f"other met. {NOT_ONE_ROAD}; name only drives over one road")
+        raise NotOneRoad(f"{one} and {other}: expected drives over the same road, found that neither explains the "
+                         f"other's record. {NOT_ONE_ROAD}; name only drives over one road")
     progress("refitting the model's parameters and the road")
     before = fit(problem.preconditioned(nominal), nominal)
     as_filed = before.problem.error(replace(nominal, roads=before.state.roads))

@@ -129,7 +129,7 @@ def responses_of(car: Car, rate_hz: float, motions: Sequence[DriveConditions]) -
     if is_linear(car):
         return np.broadcast_to(response_of(car, rate_hz), (len(motions), *_shape(car, rate_hz)))
     if car.records:
-        raise ValueError("expected a car whose record is what its sensor felt")
+        raise ValueError("expected a car without effects on its record")
     known_car(car)  # refuses laws that no linear ones stand in for
     output = Output(car.row, np.zeros(len(car.structure.wheels)), 2)
     moving_cpm = np.geomspace(FLATTENED_BELOW_CPM, SHORTEST_CPM, 80)
@@ -231,8 +231,8 @@ class SameRoad:
         self.stretches = _cut(self.runs, least_s)
         shared = {run for parts in self.stretches for run, _ in parts}
         if alone := [run.name for number, run in enumerate(self.runs) if number not in shared]:
-            raise NotOneRoad(f"{' and '.join(alone)}: expected drives over the same road, found no {least_s:g} s that "
-                             "it shares with another drive, by their distances")
+            raise NotOneRoad(f"{' and '.join(alone)}: expected drives over the same road, found by the distances "
+                             f"that no other drive shares {least_s:g} s with it")
         self.motions = [DriveConditions(float(np.median(np.gradient(one.distance_m)) * self.rate_hz), 0.0,
                                         STANDARD_WAVINESS)
                         for parts in self.stretches for _, one in parts]

@@ -360,7 +360,7 @@ class _Export:
         temporary, digest = self._stick.write(blocks)
         try:
             if self._stick.sha256(temporary) != digest:
-                raise OSError(errno.EIO, "does not read back what was written")
+                raise OSError(errno.EIO, "what it reads back differs from what was written")
             make_way(name)
             self._stick.rename(temporary, name)
         except OSError:

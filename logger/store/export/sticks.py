@@ -222,7 +222,7 @@ def pair_first(pairing: Pairing, logs: DirectoryHandle, own: DirectoryHandle, st
     if not stick:
         own.replace(STICK_NAME, [f"{name}\n".encode("ascii")])
         if _read_id(own, STICK_NAME) != name:
-            raise OSError(errno.EIO, "does not read back what was written")
+            raise OSError(errno.EIO, "what it reads back differs from what was written")
     logs.replace(PAIRED_NAME, [f"{name}\n".encode("ascii")])
     return name
 

@@ -248,8 +248,8 @@ def _by_name(there: list[str], named: Named) -> Recognised | None:
     for role, choices in named.items():
         found = [one for one in choices if plain(one.header) in there]
         if len(found) > 1 or any(there.count(plain(one.header)) > 1 for one in found):
-            raise BadInput(f"--columns: expected one column for {role} in a file, found "
-                           f"{' and '.join(one.header for one in found)} once or more")
+            raise BadInput(f"--columns: expected one column for {role} in a file, found several: "
+                           f"{' and '.join(one.header for one in found)}")
         if found:
             unit = found[0].unit or unit_in(found[0].header, role)
             columns[role] = LayoutColumn(found[0].header, unit)
@@ -359,8 +359,9 @@ def seconds(table: LoggerTable, same_as: LoggerTable | None = None) -> Array:
         unit = same_as.unit("t") or _stepping_unit(same_as.columns["t"])
     unit = unit or _epoch_unit(times)
     if unit is None:
-        raise BadInput(f"{table.header.path}: expected to know the unit of the time {table.known.columns['t'].header}: "
-                       f"give t={table.known.columns['t'].header}:UNIT in --columns, one of {', '.join(TIME_UNITS)}")
+        raise BadInput(f"{table.header.path}: expected a unit of the time {table.known.columns['t'].header}, "
+                       f"found none: give t={table.known.columns['t'].header}:UNIT in --columns, one of "
+                       f"{', '.join(TIME_UNITS)}")
     times_s = np.asarray(times * TIME_UNITS[unit])
     if (far := np.abs(times_s) > TIME.largest).any():
         raise table.wrong(int(np.argmax(far)), f"expected times within {TIME.largest:g} s, found "

@@ -517,8 +517,8 @@ def _way_of(velocity_mps: Array, rate_hz: float, file: str) -> Array:
     swing_m = float(np.ptp(way_m[:, 0] - np.linspace(0.0, drift_m, len(way_m))))
     if abs(drift_m) > swing_m:
         raise BadInput(f"{file}: expected velocities of a part that stays on its bench, found a drift by "
-                       f"{drift_m:.3g} m beside a stroke of {swing_m:.3g} m: give {PART_COLUMNS[1]}, or take the zero "
-                       f"of {PART_COLUMNS[2]} off")
+                       f"{drift_m:.3g} m beside a stroke of {swing_m:.3g} m: give {PART_COLUMNS[1]}, or subtract "
+                       f"the zero offset of {PART_COLUMNS[2]}")
     return way_m
 
 

@@ -115,7 +115,7 @@ def read_vehicle(path: Path | str) -> Vehicle:
     """
     vehicle, keys, _ = _read(path)
     if "effects" in keys and keys["effects"].items():
-        raise keys["effects"].wrong("no effects: this is for a plain car only")
+        raise keys["effects"].wrong("no effects, as this takes only a car without them")
     return vehicle
 
 
@@ -169,8 +169,8 @@ def _read_errors(keys: Mapping[str, Node], vehicle: Vehicle, effects: Sequence[C
     rows = [[node.number(low=-1.0, high=1.0) for node in row.items()] for row in keys["correlations"].items()
             ] if "correlations" in keys else []
     if rows and [len(row) for row in rows] != list(range(len(errors))):
-        raise keys["correlations"].wrong(f"a row for each of {len(errors)} standard errors, of one value for each "
-                                         "before it")
+        raise keys["correlations"].wrong(f"{len(errors)} rows, one for each standard error, the first without values "
+                                         "and each with one value more than the row above it")
     return NumberErrors(errors, tuple(map(tuple, rows)))
 
 

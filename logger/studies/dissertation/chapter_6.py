@@ -314,8 +314,8 @@ def table_6_5(effort: Workload) -> Result:
                f"manhole {rows[1][7]:.0f} to {rows[1][8]:.0f} mm deep and a stretch of IRI {rows[2][7]:.0f} to "
                f"{rows[2][8]:.0f} m/km. Such edges and manholes exist on any campus; damage of that IRI exceeds the "
                "10.75 m/km at which Table 2.3 ends damaged pavements, so the stretch was short, or the console "
-               "resonated. The model is linear, so a_w goes with the size. The ranges of Table 2.5 overlap; the more "
-               "severe word is taken.")
+               "resonated. The model is linear, so a_w is proportional to the size. The ranges of Table 2.5 "
+               "overlap; the more severe word is taken.")
     depths = np.linspace(0.0, 60.0, 2)
     limits = tuple(Line(word.replace("_", " "), depths, np.full(2, limit))
                    for limit, word in COMFORT_WORDS if 0 < limit < 2.0)

@@ -23,7 +23,7 @@ class ForceLimit(ActuatorEffect):
                   "exponent: the higher, the sharper the limit", default=1.0),
     )
     source = "K. J. Astrom, L. Rundqwist, Proc. American Control Conference (1989) 1693: actuators that saturate"
-    signature = "strong pushes move it less, in proportion, than weak ones, at all frequencies"
+    signature = "the motion grows less than in proportion to the force, at all frequencies"
     shown_by = "push it weakly and strongly with the same motion"
     sought = Sought.ON_RIGS
     refinements = ("sharpness_ratio",)

@@ -14,14 +14,14 @@ from logger.vehicle.laws import CornerLaws
 
 
 class ProgressiveSpring(ForceEffect):
-    title = "cubic hardening or softening of the suspension springs"
+    title = "cubic hardening or softening of the springs"
     parameters = (
         Parameter("cubic_stiffness_n_per_m3", 1e6, -2e7, 1e9, 0.0, Scale.LINEAR, (3e5, 3e6, 3e7),
                   "force per cube of the travel from rest, of each suspension"),
         Parameter("quadratic_stiffness_n_per_m2", 5e4, -5e5, 5e5, None, Scale.LINEAR, (-5e4, 5e4),
                   "force per square of the travel from rest: above 0 stiffer in extension", default=0.0),
         Parameter("levelling_per_m2", 30.0, 0.0, 1e5, None, Scale.LINEAR, (30.0,),
-                  "1 / h^2 of springs that lie across the travel, h long: beyond h the cubic term levels off",
+                  "1 / h^2 of springs that lie across the travel and are h long; beyond h the cubic term levels off",
                   default=0.0),
         AXLE,
     )

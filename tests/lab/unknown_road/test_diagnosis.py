@@ -223,7 +223,7 @@ def test_one_road_is_distinguished_from_two(effects: list[Chosen]) -> None:
 def test_the_one_drive_over_another_road_is_named() -> None:
     runs = [run_of([], 9.0, 85.0, 1), run_of([], 14.0, 85.0, 2, OTHER), run_of([], 15.0, 85.0, 3)]
     bandwidth = shipped_effects()["sensor_bandwidth"]
-    with pytest.raises(NotOneRoad, match=r"run2: expected drives .* neither predicts what the other met|run2 and "
+    with pytest.raises(NotOneRoad, match=r"run2: expected drives .* neither explains the other's record|run2 and "
                                          "run3: "):
         diagnose_same_road(SameRoad(runs, CAR, Tolerance()), {bandwidth.name: bandwidth})
 

@@ -182,7 +182,7 @@ def test_a_shipped_vehicle_names_itself_its_sources_and_its_frequencies(name: st
     ("effects: []", "sensor: {ahead_m: 300}", "sensor", "from -10 to 10"),
     ("effects: []", "sensor: {ahead_mm: 3}", "sensor", "expected one of the keys ahead_m, left_m"),
     ("effects: []", "sensor: 0.3", "sensor", "expected a mapping"),
-    ("effects: []", "effects: [{name: roll}]", "effects", "expected no effects: this is for a plain car only"),
+    ("effects: []", "effects: [{name: roll}]", "effects", "expected no effects, as this takes only a car without them"),
     ("effects: []", "effects: ", "effects", "expected a list, found nothing"),
     ("name: rav4-2009", "name: !!python/name:os.system x", "name", "plain value"),
 ])

@@ -23,7 +23,7 @@ class HungMass(Family):
     related_effects = ("occupant", "body_bending", "payload", "cg_shift")
     kind = "BodyEffect"
     source = "J. P. Den Hartog, Mechanical Vibrations (1956), chapter 3: a mass on a spring on a mass"
-    signature = "near its own frequency, the wheel that carries it moves less than the model says; beside it, more"
+    signature = "near its own frequency, the wheel that carries it moves less than the model says; just beside it, more"
     shown_by = "drive with it and without it, or put a second sensor where it hangs"
 
     def drafts(self, context: LawContext) -> list[Draft]:
