@@ -84,7 +84,7 @@ def test_distances_that_are_off_are_reported() -> None:
 
 def test_the_number_that_was_biased_most_is_reported_with_how_wrong_it_was() -> None:
     said = bias(FOUND.names, FOUND.moved)
-    assert said == ("Without dry_friction the refit biased rear.tire_stiffness_n_per_m, sprung_mass_kg. "
+    assert said == ("Without dry_friction the refit biased rear.tire_stiffness_n_per_m and sprung_mass_kg. "
                     "rear.tire_stiffness_n_per_m came out 25.0% too high, 20.0 standard errors from its value with it.")
     low = bias(("dry_friction", "sensor_gain"), [MASS])
     assert "Without dry_friction and sensor_gain" in low and "3.4% too low" in low and low.endswith("with them.")
