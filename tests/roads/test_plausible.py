@@ -70,7 +70,7 @@ def test_each_command_refuses_a_profile_in_another_unit(command: list[str], tmp_
 
 
 def test_the_iri_of_distances_in_another_unit_names_it(tmp_path: Path) -> None:
-    for factor, unit in ((1e3, "mm"), (1 / FOOT_M, "ft"), (1e-3, "km")):
+    for factor, unit in ((1e3, "mm"), (1 / FOOT_M, "feet"), (1e-3, "km")):
         file = written(tmp_path / "profile.csv", "distance_m,elevation_m", factor * 0.1 * np.arange(2000),
                        smooth()[:2000])
         with pytest.raises(BadInput, match=rf"{unit}.*as distance_"):

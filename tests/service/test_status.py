@@ -105,7 +105,7 @@ def test_the_screen_of_a_healthy_service_says_so() -> None:
     ({"storage": StorageStatus("the disk has become read-only", 70.0, 12)}, "sudo systemctl restart ridelog"),
     ({"storage": StorageStatus(rows_lost=3)}, "3 rows were lost"),
     ({"storage": StorageStatus(recording_trouble="little room")}, "not recorded: little room"),
-    ({"storage": StorageStatus(dumps_lost=2)}, "2 dumps were removed"),
+    ({"storage": StorageStatus(dumps_lost=2)}, "ridelog removed 2 dumps"),
     ({"notices": ("roll is not corrected",)}, "roll is not corrected"),
 ])
 def test_the_screen_says_what_to_do_next(change: dict[str, object], step: str) -> None:

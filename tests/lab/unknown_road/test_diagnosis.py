@@ -202,8 +202,8 @@ def test_the_road_takes_a_gain_and_a_contact_patch() -> None:
 def test_drives_over_other_roads_are_refused() -> None:
     here = run_of([], 14.0, 80.0, 1)
     far = replace(here, distance_m=here.distance_m + 500.0)
-    with pytest.raises(NotOneRoad, match=r"run1 and run1: expected drives over the same road, found no 3 s that it "
-                                         "shares with another drive"):
+    with pytest.raises(NotOneRoad, match=r"run1 and run1: expected drives over the same road, found by the "
+                                         "distances that no other drive shares 3 s with it"):
         SameRoad([here, far], CAR, Tolerance())
     with pytest.raises(NotOneRoad, match="elsewhere: expected drives over the same road"):
         SameRoad([here, run_of([], 9.0, 80.0, 2), replace(far, name="elsewhere")], CAR, Tolerance())
