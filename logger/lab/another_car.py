@@ -119,7 +119,7 @@ def likeliest_rig(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chose
     """
     if all(normalised_rms_error([run], [one]) < POOR_ERROR for run, one in zip(runs, predictions, strict=True)):
         return None
-    wide = Posterior(SimulatedRuns(list(map(_first_part, runs))), vehicle, tolerance)
+    wide = Posterior(SimulatedRuns(list(map(_first_part, runs)), SEARCH_HZ), vehicle, tolerance)
 
     def gains_and_errors(predictions: Sequence[Array]) -> tuple[Array, Array]:
         found = []

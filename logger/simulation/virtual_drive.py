@@ -1,7 +1,7 @@
 """What a recorder would see: a car driven over a road, or stood on a rig, with its effects."""
 
 import inspect
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass, replace
@@ -16,6 +16,7 @@ from logger.roads.obstacles import OBSTACLES
 from logger.runs import ACCELERATION, SENSOR, Past, Run, Signal, zero_is_known
 from logger.simulation.beginning import Beginning, beginning, begins_unknown
 from logger.vehicle.compose import MOST_MPS2, Car, Response, bounded, fine_outputs, recorded, respond, stepper_of
+from logger.vehicle.linear_slopes import STEP, Read, is_steady, recorded_slopes
 from logger.vehicle.models import structure_of
 from logger.vehicle.modes import modes, undamped_frequencies_hz, vibrating
 from logger.vehicle.simulate import FINE_RATE_HZ, Passage
@@ -47,15 +48,19 @@ def recorded_signals(car: Car, passage: Passage, signals: tuple[Signal, ...], ma
 
     ValueError for a signal that this car does not have.
     """
-    first = output_of(car, main) if main.name != SENSOR or car.structure.held else car.output
     if not signals and main.name == SENSOR and has_zero:
         return recorded(car, passage)
-    outputs = [first, *(output_of(car, one) for one in signals)]
+    outputs = _outputs_of(car, main, signals)
     found = passage.recorded_of((car.body, main, signals), lambda: fine_outputs(car, passage, outputs), car.factor)
     found[0] = car.written(passage, found[0])
     begins = int(has_zero)
     found[begins:] -= found[begins:].mean(axis=1, keepdims=True)
     return found.ravel()
+
+
+def _outputs_of(car: Car, main: Signal, signals: tuple[Signal, ...]) -> list[Output]:
+    first = output_of(car, main) if main.name != SENSOR or car.structure.held else car.output
+    return [first, *(output_of(car, one) for one in signals)]
 
 
 def output_of(car: Car, signal: Signal) -> Output:
@@ -167,6 +172,23 @@ class SimulatedRuns:
             partial(_recorded, car), passages, self.runs)
         return [run.in_band(one) for run, one in zip(self.runs, each, strict=True)]
 
+    def linear_slopes(self, car_with: Callable[[Array], Car], here: Array,
+                      distance_error_m: Sequence[Array] | None = None) -> tuple[list[int], list[Array]]:
+        """Derivatives (q, n) per run of rough predictions by logarithms of a car's numbers (p,), as far as only its
+        matrices depend on them, and which of them these are: of a car with laws of its own, on a bench, or whose
+        initial state nobody knows none, and not where its wheels stand on a road."""
+        car = car_with(here)
+        if car.bends_laws or car.structure.held or not is_steady(car.structure) or any(
+                begins_unknown(car, run) for run in self.runs):
+            return [], []
+        passages = self._unbegun(car, distance_error_m, rough=True)
+        around = {index: (car_with(here + way), car_with(here - way))
+                  for index, way in enumerate(STEP * np.eye(len(here)))}
+        which = [index for index, cars in around.items() if all(
+            passage.place_of(one.structure) == passage.place_of(car.structure) for one in cars for passage in passages)]
+        return which, [_slopes(car, passage, run, [around[one] for one in which])
+                       for run, passage in zip(self.runs, passages, strict=True)]
+
     def respond(self, car: Car, distance_error_m: Sequence[Array] | None = None) -> list[Response]:
         """The response of the car in each run: its record, and the motions of suspensions and tires."""
         with np.errstate(over="ignore", invalid="ignore"):
@@ -231,6 +253,24 @@ def _recorded(car: Car, passage: Passage, run: Run) -> Array:
     with np.errstate(over="ignore", invalid="ignore"):
         found = recorded_signals(car, passage, run.signals, main, zero_is_known(main, run.track))
     return np.clip(np.nan_to_num(found, nan=MOST_MPS2), -MOST_MPS2, MOST_MPS2)
+
+
+def _slopes(car: Car, passage: Passage, run: Run, around: Sequence[tuple[Car, Car]]) -> Array:
+    """Derivatives (p, n) of what a run's signals, joined, read of a linear car, by ``around`` of ``recorded_slopes``.
+    """
+    main = run.facts.main
+
+    def read(one: Car) -> Read:
+        return one, _outputs_of(one, main, run.signals)
+
+    *slopes, recorded = recorded_slopes(passage, read(car), [(read(high), read(low)) for high, low in around])
+    begins, joined, plain = int(zero_is_known(main, run.track)), [], car.written(passage, recorded[0])
+    for one in slopes:
+        if car.records:
+            one[0] = (car.written(passage, recorded[0] + STEP * one[0]) - plain) / STEP
+        one[begins:] -= one[begins:].mean(axis=1, keepdims=True)
+        joined.append(run.in_band(one.ravel()))
+    return np.array(joined).reshape(len(around), -1)
 
 
 AFTER_S = 1.0

@@ -295,18 +295,17 @@ def _of_motion(structure: Structure, motion: Motion, inputs: Array, outputs: Seq
 
 def in_blocks(structure: Structure, passage: Passage, observe: Array) -> Array:
     """Outputs (M, p) ``observe`` (p, 2 n) of the state at the fine instants, of a linear car."""
-    inputs, mean = passage.under_wheels(structure)
-    transition, gain = _linear_step(structure, passage.step_s)
-    around = np.concatenate([2 * inputs[:1] - mean[:1], mean, 2 * inputs[-1:] - mean[-1:]])
-    driving = np.hstack([mean, (around[2:] - around[:-2]) / 4])
+    driving = passage.means_and_rises(structure)
+    transition, gain = linear_step(structure, passage.step_s)
     if structure.on_base:  # that of a rig which a force drives is at rest
         moves = driving.any(axis=0) & gain.any(axis=0)
         driving, gain = driving[:, moves], gain[:, moves]
-    return driven_outputs(transition, gain, observe, driving, begun(structure.at_rest(inputs[0]), passage.begins))
+    start = begun(structure.at_rest(passage.under_wheels(structure)[0][0]), passage.begins)
+    return driven_outputs(transition, gain, observe, driving, start)
 
 
-@lru_cache(maxsize=16)
-def _linear_step(structure: Structure, step_s: float) -> tuple[Array, Array]:
+@lru_cache(maxsize=64)  # two for each number of a car (``linear_slopes``)
+def linear_step(structure: Structure, step_s: float) -> tuple[Array, Array]:
     """The transition of the state over a step, and what the inputs' means and rises do to it."""
     transition, at_start, at_end = straight_step(*structure.state_space(), step_s)
     return transition, np.hstack([at_start + at_end, at_end - at_start])

@@ -126,7 +126,8 @@ class Passage:
         self._known: dict[Hashable, tuple[Array, Array]] = {}
         self._bodies: dict[Hashable, Complex] = {}
         self._beginnings: dict[Hashable, Any] = {}
-        self._smooth: tuple[Array | None, Array] = None, AT_REST
+        self._smooth: list[tuple[Array | None, Array]] = [(None, AT_REST)]
+        self._transformed: tuple[Array, Complex, Complex] | None = None
         self._cuts: dict[int, Passage] = {}
 
     @property
@@ -168,10 +169,7 @@ class Passage:
     def under_wheels(self, structure: Structure) -> tuple[Array, Array]:
         """Elevations under the wheels at the fine instants (M, w) and their means in each step (M - 1, w) [m], counted
         from where the front left wheel begins; then further inputs of the structure, forces last."""
-        # A rig's table is the same under all wheels of an axle, wherever that is.
-        wheels = np.sign(structure.behind_m) if self.track.timed else (
-            structure.contact_patch_m, *structure.behind_m, *np.sign(structure.left_m), structure.surface)
-        place = (*wheels, structure.actuators, structure.on_base, structure.held)
+        place = self.place_of(structure)
         known = self._known.get(place)  # another thread may take it out at any time
         if known is None:
             track = self.track.as_it_is(structure.surface, structure.actuators)
@@ -182,13 +180,35 @@ class Passage:
             self._known = _with_newest(self._known, place, known, _KEPT_PLACES)
         return known
 
+    def place_of(self, structure: Structure) -> Hashable:
+        """Equal for two structures under which the same comes. A rig's table is the same under all wheels of an axle,
+        wherever that is."""
+        wheels = np.sign(structure.behind_m) if self.track.timed else (
+            structure.contact_patch_m, *structure.behind_m, *np.sign(structure.left_m), structure.surface)
+        return (*wheels, structure.actuators, structure.on_base, structure.held)
+
+    def means_and_rises(self, structure: Structure) -> Array:
+        """The means of the inputs in each step, and by how much they rise in half of it (M - 1, 2 u): what steps a
+        linear car."""
+        inputs, mean = self.under_wheels(structure)
+        around = np.concatenate([2 * inputs[:1] - mean[:1], mean, 2 * inputs[-1:] - mean[-1:]])
+        return np.hstack([mean, (around[2:] - around[:-2]) / 4])
+
     def smooth_inputs(self, structure: Structure) -> Array:
         """Those at the fine instants, ``smooth``."""
         inputs, means = self.under_wheels(structure)
-        found = self._smooth
+        found = self._smooth[0]  # also of the same passage begun in another state
         if found[0] is not inputs:
-            found = self._smooth = inputs, smooth(inputs, means)
+            found = self._smooth[0] = inputs, smooth(inputs, means)
         return found[1]
+
+    def transformed_inputs(self, structure: Structure) -> tuple[Complex, Complex]:
+        """Transforms, behind the recorder's filter, of ``means_and_rises`` (2 u, f), and of the inputs (u, f)."""
+        inputs, found = self.under_wheels(structure)[0], self._transformed
+        if found is None or found[0] is not inputs:
+            driving, smoothed = self.means_and_rises(structure), self.smooth_inputs(structure)
+            found = self._transformed = inputs, self.transformed(driving.T), self.transformed(smoothed.T)
+        return found[1:]
 
     @property
     def forces(self) -> Forces:
@@ -205,7 +225,7 @@ class Passage:
 
         factor    of what lies between the body and the recorder, by s (f,) [1/s]
         """
-        return self._kept(self._transform(fine), factor)
+        return self.kept(self.transformed(fine), factor)
 
     def recorded_of(self, body: Hashable, accelerations: Callable[[], Array],
                     factor: Callable[[Complex], Complex]) -> Array:
@@ -215,21 +235,33 @@ class Passage:
         """
         transform = self._bodies.get(body)
         if transform is None:
-            transform = self._transform(accelerations())
+            transform = self.transformed(accelerations())
             self._bodies = _with_newest(self._bodies, body, transform, _KEPT_BODIES)
-        return self._kept(transform, factor)
+        return self.kept(transform, factor)
 
-    def _transform(self, fine: Array) -> Complex:
+    @property
+    def s(self) -> Complex:
+        """Where transforms are taken (f,) [1/s]."""
+        return self._s
+
+    def impulse(self, instant: int) -> Complex:
+        """The transform (f,) of 1 at a fine instant and 0 at all others, behind the recorder's filter."""
+        return np.asarray(self._recorder * np.exp(-self._s * (instant * self.step_s)))
+
+    def transformed(self, fine: Array) -> Complex:
+        """The transform (..., f) of signals at the fine instants (..., M) or at the first of them, behind the
+        recorder's filter, but for samples of a bench."""
         if mirrored := self._mirrored * self.steps:
             fine = np.concatenate([2 * fine[..., :1] - fine[..., mirrored:0:-1], fine], axis=-1)
         found = np.fft.rfft(fine, self._coarse * self.steps)[..., : len(self._s)]
         return np.asarray(found if self._of_bench else found * self._recorder)
 
-    def _kept(self, transform: Complex, factor: Callable[[Complex], Complex]) -> Array:
+    def kept(self, transform: Complex, factor: Callable[[Complex], Complex]) -> Array:
+        """The samples (..., N) of transforms (..., f); ``factor`` of those of the only signal, or of the first."""
         if transform.ndim == 1:
             behind = transform * factor(self._s)
         else:
-            behind = np.concatenate([transform[:1] * factor(self._s), transform[1:]])
+            behind = np.concatenate([transform[..., :1, :] * factor(self._s), transform[..., 1:, :]], axis=-2)
         if self._of_bench:
             sampled = np.fft.irfft(behind, self._coarse * self.steps)[..., :: self.steps // self._of_bench]
             if self._of_bench == 1:

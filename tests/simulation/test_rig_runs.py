@@ -12,7 +12,8 @@ from scipy.signal import StateSpace, lsim
 from logger.profiles.excitation import Excitation
 from logger.runs import RecordFacts, Run, Signal
 from logger.simulation.virtual_drive import SimulatedRuns, steps_hz
-from logger.vehicle.compose import compose
+from logger.vehicle.compose import Car, compose
+from logger.vehicle.named_parameters import changed, read, sized
 from logger.vehicle.vehicle import Axle, Vehicle
 
 M, INERTIA, MU, K, C, KT, A, B = 5.0, 0.12, 0.4, 900.0, 12.0, 5400.0, 0.14, 0.18
@@ -31,14 +32,18 @@ def tables(lasts_s: float) -> np.ndarray:
     return np.asarray((0.002 * z / z.std() * np.minimum(np.arange(n) / EXCITED_HZ, 1.0)).T)
 
 
-def by_hand(heights: np.ndarray, at_s: np.ndarray) -> np.ndarray:
+def by_hand(heights: np.ndarray, at_s: np.ndarray, car: Vehicle = BENCH) -> np.ndarray:
     """Accelerations of the body and of the rear wheel, pitch rate and front travel (4, n)."""
-    mass = np.diag([M, INERTIA, MU, MU])
-    ends = np.array([[1, A, -1, 0], [1, -B, 0, -1]], dtype=float)  # extension of the suspensions
-    stiffness = K * ends.T @ ends + np.diag([0, 0, KT, KT])
-    damping = C * ends.T @ ends
+    assert car.pitch_inertia_kg_m2 and car.rear
+    axles = [car.front, car.rear]
+    mass = np.diag([car.sprung_mass_kg, car.pitch_inertia_kg_m2, *(one.unsprung_mass_kg for one in axles)])
+    ends = np.array([[1, car.front.cg_distance_m, -1, 0], [1, -car.rear.cg_distance_m, 0, -1]])  # of the suspensions
+    tires = np.diag([one.tire_stiffness_n_per_m for one in axles])
+    stiffness = ends.T @ np.diag([one.suspension_stiffness_n_per_m for one in axles]) @ ends
+    stiffness[2:, 2:] += tires
+    damping = ends.T @ np.diag([one.suspension_damping_n_s_per_m for one in axles]) @ ends
     a = np.block([[np.zeros((4, 4)), np.eye(4)], [-np.linalg.solve(mass, stiffness), -np.linalg.solve(mass, damping)]])
-    b = np.vstack([np.zeros((6, 2)), np.eye(2) * KT / MU])
+    b = np.vstack([np.zeros((6, 2)), np.linalg.solve(mass[2:, 2:], tires)])
     rows = np.vstack([a[4], a[7], np.eye(8)[5], np.append(ends[0], np.zeros(4))])
     direct = np.vstack([b[4], b[7], np.zeros((2, 2))])
     time_s = np.arange((len(heights) - 1) * FINE + 1) / EXCITED_HZ / FINE
@@ -92,3 +97,47 @@ def test_a_force_of_a_moved_mass_holds_no_vibration_that_is_faster_than_its_step
     phase = 2 * np.pi * 3
     expected = 0.01 * (30.0 * phase * np.cos(phase * at) - 50.0 * phase**2 * np.sin(phase * at))
     assert np.abs(force_n - expected).max() < 0.01 * np.abs(expected).max()
+
+
+def test_derivatives_by_all_numbers_of_a_rig_are_those_of_its_equations_of_motion() -> None:
+    heights, names = tables(8.0), sized(BENCH)
+    time_s = 0.73 + np.arange(round(6.5 * RATE_HZ)) / RATE_HZ
+    nothing = np.zeros(len(time_s))
+    run = Run("bench", RATE_HZ, nothing + 1.0, nothing, nothing, Excitation(EXCITED_HZ, heights, -0.73),
+              facts=RecordFacts(signals=SIGNALS), more=np.ones((3, len(time_s))))
+
+    def moved(logs: np.ndarray) -> Vehicle:
+        return changed(BENCH, {name: read(BENCH, name) * float(np.exp(one))
+                               for name, one in zip(names, logs, strict=True)})
+
+    here = np.linspace(-0.2, 0.2, len(names))
+    which, (found,) = SimulatedRuns([run], 4 * steps_hz(BENCH)).linear_slopes(lambda logs: compose(moved(logs)), here)
+    assert which == list(range(len(names)))
+    for index, one in zip(which, found, strict=True):
+        way = 1e-3 * (np.arange(len(names)) == index)
+        high, low = (by_hand(heights, time_s, moved(here + by)) for by in (way, -way))
+        expected = (high - low) / 2e-3
+        expected[[1, 2, 3]] -= expected[[1, 2, 3]].mean(axis=1, keepdims=True)
+        for slope, right in zip(one.reshape(4, -1)[[0, 2, 1, 3]], expected, strict=True):
+            assert np.abs(slope - right).max() <= 5e-3 * np.abs(right).max()
+
+
+@pytest.mark.parametrize("damping_ratio", [0.002, 1.0])  # rings on behind the record; two modes are one
+def test_derivatives_of_a_mass_obey_its_dimensions_and_are_those_of_simulations(damping_ratio: float) -> None:
+    mass_kg, stiffness = 3.0, 3.0 * (2 * np.pi * 4.0)**2
+    vehicle = Vehicle("rig", "single_mass", mass_kg, None, Axle(
+        0.0, 0.0, stiffness, 2 * damping_ratio * np.sqrt(stiffness * mass_kg), 0.0), None, 0.0)
+    nothing, names = np.zeros(1200), sized(vehicle)
+    run = Run("rig", RATE_HZ, nothing + 1.0, nothing, nothing, Excitation(EXCITED_HZ, tables(6.5)[:, 0], 0.0))
+
+    def car(logs: np.ndarray) -> Car:
+        return compose(changed(vehicle, {name: read(vehicle, name) * float(np.exp(one))
+                                         for name, one in zip(names, logs, strict=True)}))
+
+    runs = SimulatedRuns([run], 500.0)
+    which, (found,) = runs.linear_slopes(car, np.zeros(len(names)))
+    assert which == [0, 1, 2] and len(names) == 3
+    assert np.abs(found.sum(axis=0)).max() < 1e-6 * np.abs(found).max()  # all forces and masses larger by one factor
+    for one, way in zip(found, 1e-4 * np.eye(3), strict=True):
+        (high,), (low,) = runs.predict(car(way)), runs.predict(car(-way))
+        assert np.abs(one - (high - low) / 2e-4).max() < 1e-5 * np.abs(one).max()

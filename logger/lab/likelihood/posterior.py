@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 
@@ -226,31 +227,41 @@ class Posterior:
         return normalised_rms_error(self.runs.runs, state.predictions)
 
     def number_slopes(self, state: State, steps: Array) -> list[Array]:
-        """Derivatives of the predictions by the logarithms of the car's numbers: (p, n) per run, by differences over
-        steps (p,) of rough simulations, which are near enough.
+        """Derivatives of the predictions by the logarithms of the car's numbers: (p, n) per run, of rough simulations,
+        which are near enough: of a linear car all at once, else by differences over steps (p,).
 
         Where only the prior knows the common scale of masses and forces, the derivatives by all of them cancel. Those
         by one-sided differences of a mode that little damps do not: they would measure the scale. There the differences
         are central; those of a model with effects are rid of the scale with theirs."""
-        error_m = self.distance_error_m(state.record)
+        error_m, car = self.distance_error_m(state.record), partial(self.car, state.effects)
+        exact, slopes = self.runs.linear_slopes(car, state.logs, error_m)
+        rest = steps.copy()
+        rest[exact] = 0.0
+        if not rest.any():
+            return slopes
         near = self.beginnings(state.effects, state.logs, state.record)
 
         def predict(logs: Array) -> list[Array]:
-            return self.runs.predict(self.car(state.effects, logs), error_m, rough=True, near=near)
+            return self.runs.predict(car(logs), error_m, rough=True, near=near)
 
         here = predict(state.logs)
-        if self.prior.is_vague and not self.shows_forces and not state.effects:
-            above, below = (derivatives(predict, state.logs, some, here) for some in (steps, -steps))
-            return [(one + other) / 2 for one, other in zip(above, below, strict=True)]
-        return derivatives(predict, state.logs, steps, here)
+        found = derivatives(predict, state.logs, rest, here)
+        if exact:
+            for one, more in zip(found, slopes, strict=True):
+                one[exact] = more
+        elif self.prior.is_vague and not self.shows_forces and not state.effects:
+            below = derivatives(predict, state.logs, -rest, here)
+            found = [(one + other) / 2 for one, other in zip(found, below, strict=True)]
+        return found
 
 
 def derivatives(predict: Callable[[Array], Sequence[Array]], here: Array, steps: Array,
                 predictions: Sequence[Array]) -> list[Array]:
-    """Derivatives (m, n) per run of predictions (n,) by numbers (m,), by differences over steps (m,)."""
-    found = [np.empty((len(steps), len(one))) for one in predictions]
-    for index, step in enumerate(steps):
-        there = here.copy()
+    """Derivatives (m, n) per run of predictions (n,) by numbers (m,), by differences over steps (m,);
+    0 where such a step is 0."""
+    found = [np.zeros((len(steps), len(one))) for one in predictions]
+    for index in np.flatnonzero(steps):
+        step, there = steps[index], here.copy()
         there[index] += step
         for column, high, low in zip(found, predict(there), predictions, strict=True):
             column[index] = (high - low) / step

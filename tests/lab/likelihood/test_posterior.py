@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from logger.arrays import Array
+from logger.lab.likelihood.posterior import derivatives
 from logger.runs import RecordFacts
 from logger.simulation.virtual_drive import SimulatedRuns
+from logger.vehicle.effect import Chosen
 
 from ...support.lab.secret_runs import FINE_HZ, hidden, posterior_of, secret_runs
 
@@ -48,3 +50,20 @@ def test_readings_are_bounds_where_a_step_is_large_beside_the_noise_and_nowhere_
     plain, coarse = posterior_of(SimulatedRuns(runs, FINE_HZ)), posterior_of(SimulatedRuns(stepped, FINE_HZ))
     assert plain.with_rounding_at(plain.start()) is plain
     assert coarse.with_rounding_at(coarse.start()) is not coarse
+
+
+@pytest.mark.parametrize("effects", [
+    [], [hidden("occupant")], [hidden("payload", mass_kg=90.0), hidden("sensor_bandwidth")],
+    [hidden("time_offset", delay_s=0.03), hidden("sensor_offset")]])
+def test_derivatives_by_the_cars_numbers_are_those_of_simulations(effects: list[Chosen]) -> None:
+    posterior = posterior_of(secret_runs(lasts_s=6.0))
+    state, steps = posterior.start(effects), np.full(len(posterior.prior.names), 1e-4)
+    error_m = posterior.distance_error_m(state.record)
+
+    def predict(logs: Array) -> list[Array]:
+        return posterior.runs.predict(posterior.car(effects, logs), error_m, rough=True)
+
+    here = predict(state.logs)
+    above, below = (derivatives(predict, state.logs, way * steps, here) for way in (1, -1))
+    for one, high, low in zip(posterior.number_slopes(state, steps), above, below, strict=True):
+        assert np.abs(one - (high + low) / 2).max() < 2e-3 * np.abs(one).max()  # lengths by one-sided ones
