@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Generic, Protocol, TypeVar, cast
 
 import numpy as np
 
@@ -390,7 +390,13 @@ class Search(Generic[M, P, F]):
             *earlier, added = names_of(now)[self.present:]
             last = UNTRIED
             if not earlier and (refitted := self.without(now, added)).score < before.score - INDISTINGUISHABLE:
-                return self._begun(refitted)  # the effect led the fit of the car's own numbers out of a wrong minimum
+                # The effect led the fit of the car's own numbers out of a wrong minimum: the others are tried there,
+                # too, unless all that they gained before would not be enough.
+                if now.score > refitted.score - max((one.gain for one in first.fits if one.effect.name != added),
+                                                    default=0.0):
+                    return self._begun(refitted)
+                fits, lost, before = cast(tuple[Any, ...], first.fits), before.score - refitted.score, refitted
+                first = replace(first, fits=tuple(replace(one, gain=one.gain - lost) for one in fits))
             steps.append((added, now.hold_out))
             for name in earlier:
                 now = self._reconsider(before, now, name)

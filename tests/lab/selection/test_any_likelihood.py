@@ -61,16 +61,18 @@ class Tried:
 @dataclass(frozen=True)
 class MadeUp:
     """The likelihood; some effects are doubtful, and refinements explain something where so many effects are found.
-    ``fitted``: names of what was fitted, and how many effects there were."""
+    ``fitted``: names of what was fitted, and how many effects there were. ``frees``: with which the car's own numbers
+    get out of a wrong minimum."""
 
     doubtful: tuple[str, ...] = ()
     refined_from: int = 1
+    frees: tuple[str, ...] = tuple(WORTH)
     fitted: list[tuple[str, int]] = field(default_factory=list)
 
     def screened(self, base: Made, effects: Sequence[Effect], seen: Misalignment, near: Chosen | None,
                  pool: ThreadPoolExecutor, progress: Progress) -> list[Tried]:
-        tried = [Tried(replace(base, effects=(*base.effects, chosen(one, one.usual)), stuck=False), WORTH[one.name])
-                 for one in effects]
+        tried = [Tried(replace(base, effects=(*base.effects, chosen(one, one.usual)),
+                               stuck=base.stuck and one.name not in self.frees), WORTH[one.name]) for one in effects]
         return sorted(tried, key=lambda one: -one.gain)
 
     def laid_anew(self, base: Made) -> None: ...
@@ -138,6 +140,18 @@ def test_all_that_is_evident_is_found_the_most_telling_first() -> None:
 def test_a_gain_that_is_the_fit_of_the_cars_own_numbers_is_no_effects() -> None:
     found, plain = search().run(Made(stuck=True)), search().run(Made())
     assert found.before == Made() and found.now == plain.now
+
+
+def test_where_one_effect_leads_out_of_a_wrong_minimum_others_are_tried_there_as_far_as_they_may_win() -> None:
+    rounds = {}
+    for frees in (("sensor_gain",), ("tire_damping",)):
+        asked = replace(search(), likelihood=MadeUp(frees=frees))
+        found, plain = asked.run(Made(stuck=True)), search().run(Made())
+        assert found.before == Made() and found.now == plain.now
+        assert isinstance(asked.likelihood, MadeUp)
+        rounds[frees] = [name for name, effects in asked.likelihood.fitted if not effects].count("sensor_offset")
+        assert {one.effect.name: one.gain for one in found.first.fits}["sensor_gain"] == WORTH["sensor_gain"]
+    assert rounds == {("sensor_gain",): 1, ("tire_damping",): 2}
     assert (found.gains, found.rivals, found.steps) == (plain.gains, plain.rivals, plain.steps)
 
 
