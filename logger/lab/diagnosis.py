@@ -478,7 +478,9 @@ def candidates_of(search: Search[M, P, F], selection: Selection[M, P, F], after:
         alone[fit.effect.name] = replace(there, confused_with=tuple(
             one.effect.name for one in fits if one is not fit and abs(one.gain - fit.gain) < INDISTINGUISHABLE
             and there.p_value < FALSE_ALARM))
-    alone |= {one.effect.name: candidate(*best_of(one), fitted=False) for one in selection.first.unfitted}
+    for screened in selection.first.unfitted:
+        best, gain, unseen = best_of(screened)
+        alone[screened.effect.name] = candidate(best, gain - selection.first.refit_gain, unseen, fitted=False)
     for name, gain in selection.gains.items():
         here = candidate(final[name], gain, last, selection.rivals.get(name, ()))
         by_itself = alone.pop(name, here)

@@ -117,9 +117,9 @@ def test_derivatives_by_all_numbers_of_a_rig_are_those_of_its_equations_of_motio
         way = 1e-3 * (np.arange(len(names)) == index)
         high, low = (by_hand(heights, time_s, moved(here + by)) for by in (way, -way))
         expected = (high - low) / 2e-3
-        expected[[1, 2, 3]] -= expected[[1, 2, 3]].mean(axis=1, keepdims=True)
         for slope, right in zip(one.reshape(4, -1)[[0, 2, 1, 3]], expected, strict=True):
-            assert np.abs(slope - right).max() <= 5e-3 * np.abs(right).max()
+            off = (slope - right)[40:-40]
+            assert np.abs(off - off.mean()).max() <= 5e-3 * np.abs(right).max()
 
 
 @pytest.mark.parametrize("damping_ratio", [0.002, 1.0])  # rings on behind the record; two modes are one

@@ -270,11 +270,13 @@ class MeasuredRoad:
 
 @dataclass(frozen=True, eq=False)
 class SearchRound(Generic[P, F]):
-    """All effects tried on a model: those that were fitted, best first, and the screening of the others; on which."""
+    """All effects tried on a model: those that were fitted, best first, and the screening of the others; on which, and
+    what that has gained since by another fit of its car, which is still among what the screening promises."""
 
     fits: tuple[F, ...]
     unfitted: tuple[P, ...]
     on: object = None
+    refit_gain: float = 0.0
 
 
 UNTRIED: SearchRound[Any, Any] = SearchRound((), ())
@@ -396,7 +398,7 @@ class Search(Generic[M, P, F]):
                                                     default=0.0):
                     return self._begun(refitted)
                 fits, lost, before = cast(tuple[Any, ...], first.fits), before.score - refitted.score, refitted
-                first = replace(first, fits=tuple(replace(one, gain=one.gain - lost) for one in fits))
+                first = replace(first, fits=tuple(replace(one, gain=one.gain - lost) for one in fits), refit_gain=lost)
             steps.append((added, now.hold_out))
             for name in earlier:
                 now = self._reconsider(before, now, name)
