@@ -258,7 +258,7 @@ def optimise_numbers(linear: LinearModel, state: State, free_parameters: Sequenc
             slopes = effect_slopes(linear.posterior, at.effects, at.logs, free_parameters, at.record, own)
             known = x.copy(), at, slopes
             if linear.prior.is_vague:
-                here, freed = without_common_scale(linear, at.effects, slopes)
+                here, freed = without_common_scale(linear, at.effects, free_parameters, slopes)
                 slopes = freed or slopes
             own = linear.whitened(slopes)
         information = here.information(own)
@@ -324,8 +324,8 @@ def own_slopes(posterior: Posterior, state: State, whiteners: Sequence[JointWhit
     return slopes
 
 
-def without_common_scale(linear: LinearModel, effects: Sequence[Chosen], own: list[Array] | None
-                         ) -> tuple[LinearModel, list[Array] | None]:
+def without_common_scale(linear: LinearModel, effects: Sequence[Chosen], free_parameters: Sequence[FreeParameter],
+                         own: list[Array] | None) -> tuple[LinearModel, list[Array] | None]:
     """The model and the derivatives by the numbers of its effects (m, n), per run, without a common scale of all
     masses and forces but that of the forces that drive a rig: a car in which they are larger by one factor moves the
     same. Differences over steps do not show that exactly, least of all of a mode that little damps, or of dry friction,
@@ -333,13 +333,13 @@ def without_common_scale(linear: LinearModel, effects: Sequence[Chosen], own: li
     signals shows the size."""
     if linear.numbers is None or linear.posterior.measures_forces:
         return linear, own
-    return with_dimensions(linear, effects, own, linear.posterior.size_slopes(linear.state))
+    return with_dimensions(linear, effects, free_parameters, own, linear.posterior.size_slopes(linear.state))
 
 
-def with_dimensions(linear: LinearModel, effects: Sequence[Chosen], own: list[Array] | None, wanted: Sequence[Array]
-                    ) -> tuple[LinearModel, list[Array] | None]:
-    """The model and the derivatives by the numbers of its effects (m, n), per run, as dimensional analysis has them
-    (E. Buckingham, Physical Review 4, 1914). A user's own effects may have units that nobody knows: there they stay.
+def with_dimensions(linear: LinearModel, effects: Sequence[Chosen], free_parameters: Sequence[FreeParameter],
+                    own: list[Array] | None, wanted: Sequence[Array]) -> tuple[LinearModel, list[Array] | None]:
+    """The model and the derivatives by the effects' free numbers (m, n), per run, as dimensional analysis has them (E.
+    Buckingham, Physical Review 4, 1914). A user's own effects may have units that nobody knows: there they stay.
 
     wanted    (1, n) per run, the derivative by the logarithm of all masses and forces together; (2, n): then that by
               all lengths and forces
@@ -347,7 +347,7 @@ def with_dimensions(linear: LinearModel, effects: Sequence[Chosen], own: list[Ar
     if linear.numbers is None or any(one.file for one in effects):
         return linear, own
     names, per_log = [*linear.prior.names], [1.0] * len(linear.prior.names)
-    for free in free_parameters_of(effects):
+    for free in free_parameters:
         parameter = effects[free.effect].effect.parameters[free.parameter]
         value = effects[free.effect].values[parameter.name]
         names.append(parameter.name)

@@ -102,8 +102,8 @@ def _covariance(linear: LinearModel) -> Array:
     posterior, state, on_rig = linear.posterior, linear.state, are_on_rig(linear.posterior.runs.runs)
     slopes, gained = own_slopes(posterior, state, linear.whiteners), posterior.carried_gain(state) if on_rig else []
     if not posterior.measures_forces:  # which no motion is, as what follows has it
-        linear, slopes = with_dimensions(linear, state.effects, slopes, posterior.size_slopes(
-            state, gained if _frees_all_lengths(posterior, state) else ()))
+        wanted = posterior.size_slopes(state, gained if _frees_all_lengths(posterior, state) else ())
+        linear, slopes = with_dimensions(linear, state.effects, free_parameters_of(state.effects), slopes, wanted)
     information = linear.information(None if slopes is None else linear.whitened(slopes))
     size = np.sqrt(np.maximum(np.diag(information), 0.0))
     known = size > 0

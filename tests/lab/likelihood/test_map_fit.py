@@ -13,7 +13,7 @@ import numpy.typing as npt
 import pytest
 
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import CONVERGED, align, fit, fit_to_the_end
+from logger.lab.likelihood.map_fit import CONVERGED, align, effect_slopes, fit, fit_to_the_end, without_common_scale
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.simulation.virtual_drive import SimulatedRuns
@@ -23,7 +23,7 @@ from logger.vehicle.uncertain import grows_with_mass
 
 from ...support.lab.noisy_runs import drawn, noisy_runs, posterior_of, tire_damping
 from ...support.lab.runs_with_residual import CAR
-from ...support.lab.secret_runs import EFFECTS, FINE_HZ, NOISE_MPS2
+from ...support.lab.secret_runs import EFFECTS, FINE_HZ, NOISE_MPS2, hidden
 from ...support.slow import slow
 
 Array = npt.NDArray[np.float64]
@@ -204,3 +204,14 @@ def test_a_rough_simulation_of_friction_tells_what_a_change_does() -> None:
     fine, rough = (np.concatenate([there - here for here, there in zip(
         *(posterior.runs.predict(car, rough=how) for car in cars), strict=True)]) for how in (False, True))
     assert 0 < np.sqrt(np.mean((rough - fine) ** 2)) < 0.2 * np.sqrt(np.mean(fine**2))
+
+
+def test_a_refinement_that_comes_back_to_its_default_stays_a_number_of_the_fit() -> None:
+    """A stop in extension that a step moved out of reach, to where none is."""
+    model = plain()
+    near, gone = (hidden("bump_stop", extension_clearance_m=place_m) for place_m in (0.05, 1.0))
+    free = free_parameters_of([near])
+    own = effect_slopes(model.posterior, [gone], model.state.logs, free, model.state.record, None)
+    assert len(free_parameters_of([gone])) < len(free)
+    freed = without_common_scale(model, [gone], free, own)[1]
+    assert freed and [one.shape for one in freed] == [one.shape for one in own]
