@@ -14,12 +14,26 @@ import numpy as np
 from logger.arrays import Array
 from logger.errors import BadInput
 
+SURE_SIGMA, UNUSUAL_SIGMA, CONFLICT_SIGMA = 2.0, 3.0, 4.0
+"""Standard deviations that a number is off by chance once in 22 times, 370 and 16,000 (normal distribution): beyond the
+first it surely differs; beyond the second it is unusual, of a dozen right numbers one in thirty comparisons; beyond the
+third it is in conflict with what was known of it."""
+FALSE_SHARE = 0.05
+"""Of what is said to have changed, the share that has not."""
 MOST_SAMPLES = 10_000_000
 """28 hours at 100 Hz, 500 km of road at 0.05 m: 80 MB a column, so that a desk command stays below half a gigabyte."""
 MOVING_MPS = 3.0
 """A car that is faster drives, whatever its receiver errs by."""
+DISCREPANCY = 0.003
+"""Share of the signal in a band by which two right simulations of one car may differ. They differ most where a car has
+dry friction, whose force is delayed by part of a step. A judgement: with 1 %, searches called right models unexplained.
+"""
 FASTEST_HZ = 1e6
 """No accelerometer is read faster."""
+QUIETEST_MPS2 = 1e-6
+"""No accelerometer has less noise: a ten-millionth of g. What moves less does not move."""
+EVEN_SAMPLES = 1e-3
+"""A time, or a place, within so many samples of one is at that sample: rates are read off times that were rounded."""
 LONGEST_HOLE_S = 0.5
 """Over a shorter hole readings lie on a straight line, on which filters run on."""
 ROUNDING_STEPS = 0.2

@@ -101,8 +101,10 @@ USUAL_TOLERANCE = 0.2
 """How far off a car's masses, springs and dampers may well be, as a share."""
 SPEED, RATE, ADDED = Range(0.1, 100.0, "m/s"), Range(10.0, 10_000.0, "Hz"), Range(0.0, 100.0, "m/s2")
 """Of a simulated drive; what its sensor adds, noise or steps. An estimate's steps likewise."""
-NOISE, WINDOW = Range(1e-4, 100.0, "m/s2"), Range(1.0, 1000.0, "m")
+READING_NOISE, WINDOW = Range(1e-4, 100.0, "m/s2"), Range(1.0, 1000.0, "m")
 """Of an estimate: noise of a reading, length of a window."""
+WHEELBASE, CAR_MASS = Range(1.5, 6.0, "m"), Range(300.0, 10_000.0, "kg")
+"""From the smallest car with two axles to a lorry."""
 AUTO, UNKNOWN = "auto", "unknown"
 """Of a noise: learned. Of a vehicle's numbers: nothing is known of them."""
 LENGTH, SPACING = Range(11.0, 1e6, "m"), Range(0.001, 0.3, "m")
@@ -115,8 +117,6 @@ NOISE_MODELS = ("auto", "white", "ar", "road")
 MODAL_METHODS = ("era", "ssi", "n4sid", "decrement")
 MODAL_METHODS_GONE = {"ar": "ssi", "ssi-cov": "ssi", "fft": "ssi", "arx": "n4sid", "armax": "n4sid"}
 """Of modes: the methods, and for those that are no longer offered the one to use."""
-COMMON_IRI, COMMON_SPEED_MPS = 2.5, 15.0
-"""Road [m/km] and speed on which laws that are not linear are looked at, where nothing else is said."""
 DAILY_HOURS = Range(0.001, 24.0, "hours")
 """Of riding, for values of health."""
 
@@ -225,7 +225,6 @@ Notify = Callable[[str], None]
 _UNIT = re.compile(r"_(hz|s|m|kg|cm3|mps2?|m_per_km)$")
 """Ends of fields' names that are units: an option is called without."""
 
-_WIDTH = 120
 _IN_PYTHON = "\nIn Python: "
 """Where the part of a question's docstring begins that is of no use at the terminal."""
 
@@ -506,7 +505,7 @@ def _described(question: type[Any]) -> Iterator[str]:
              if get_origin(kinds[one.name]) is Annotated}
     width = max(map(len, known), default=0) + 2
     for name, words in known.items():
-        yield from textwrap.wrap(words, _WIDTH, initial_indent=f"{name:{width}}", subsequent_indent=" " * width)
+        yield from textwrap.wrap(words, initial_indent=f"{name:{width}}", subsequent_indent=" " * width)
 
 
 def help_of(question: type[Any]) -> str:

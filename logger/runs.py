@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from logger.arrays import Array, Bools
+from logger.bounds import EVEN_SAMPLES
 from logger.dsp.whole_record import in_band
 from logger.left_out import LeftOut, counting
 from logger.profiles.excitation import Excitation
@@ -21,8 +22,6 @@ SKIP_S = 2.0
 """How much of the beginning of a run is left out of fits and errors, as the car's past is not known [s]."""
 LEAST_S = 5.0
 """A shorter run is of no use to the lab: the body bounces some three times after ``SKIP_S`` [s]."""
-EVEN_SAMPLES = 1e-3
-"""A time within so many samples of one is at that sample: rates are read off times that were rounded."""
 RECEIVER_ERROR_LASTS_S = 60.0
 """Correlation time of the errors of a receiver's places (a judgement: the ionosphere's is longer, reflections'
 shorter)."""

@@ -1,4 +1,4 @@
-"""Exact constants and the unit conversions of the edges. Inside, everything is SI."""
+"""Exact constants, the unit conversions of the edges, and a common road. Inside, everything is SI."""
 
 STANDARD_GRAVITY_MPS2 = 9.80665
 LBF_N = 0.45359237 * STANDARD_GRAVITY_MPS2
@@ -11,5 +11,7 @@ INCH_PER_MILE_M_PER_KM = 1000.0 * FOOT_M / 12 / MILE_M
 WINDOW_M = 25 * FOOT_M
 US_PER_S = 1_000_000
 DAY_US = 86_400 * US_PER_S
+COMMON_IRI, COMMON_SPEED_MPS = 2.5, 15.0
+"""Road [m/km] and speed on which cars and laws are looked at where nothing is known of either."""
 LENGTH_UNITS_M = {"m": 1.0, "km": 1000.0, "mi": MILE_M, "ft": FOOT_M}
 """Units that a length may be given in."""

@@ -93,7 +93,7 @@ T = TypeVar("T")
 
 WINDOWS_M = (10.0, 100.0)
 """What profilers report, and what roads are judged by."""
-_FIX_S, _SMOOTH_FIXES = 1.0, 21
+FIX_S, _SMOOTH_FIXES = 1.0, 21  # receivers of phones have a place a second
 _BETWEEN_UNITS = 5.0  # gravity is 1 g or 9.8 m/s2
 
 
@@ -168,7 +168,7 @@ def on_line(run: Run, line: MeasuredLine, from_m: float) -> list[Run]:
     """
     if run.lat_deg is None or run.lon_deg is None:
         return []
-    every = np.arange(0, len(run.time_s), round(run.rate_hz * _FIX_S))
+    every = np.arange(0, len(run.time_s), round(run.rate_hz * FIX_S))
     along_m, aside_m = line.passed(run.lat_deg[every], run.lon_deg[every])
     found = []
     for one in passes(run.distance_m[every], along_m, aside_m):

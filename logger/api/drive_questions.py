@@ -24,19 +24,20 @@ from logger.errors import BadInput
 from logger.question import (
     ADDED,
     AUTO,
-    COMMON_SPEED_MPS,
+    CAR_MASS,
     DAILY_HOURS,
     LENGTH,
     MODAL_METHODS,
     MODAL_METHODS_GONE,
     MOST_ROAD_SAMPLES,
-    NOISE,
     PICTURES,
     RATE,
+    READING_NOISE,
     ROAD_WAVINESS,
     ROUGHNESS,
     SPACING,
     SPEED,
+    WHEELBASE,
     WINDOW,
     Argument,
     InPython,
@@ -50,7 +51,7 @@ from logger.question import (
     word_or_number,
 )
 from logger.question import IRI as IRI_RANGE
-from logger.units import WINDOW_M
+from logger.units import COMMON_SPEED_MPS, WINDOW_M
 
 if TYPE_CHECKING:
     from logger.store.formats.drive_file import Drive
@@ -132,9 +133,9 @@ class EstimateQuestion(LongQuestion):
         "sensor sits; in Python a model as well", metavar="NAME|FILE", read=str)]
     _: KW_ONLY
     noise_mps2: Annotated[float | Literal["auto"] | None, Option(
-        f"r.m.s. noise of one reading before rounding, {NOISE.words}; auto: learned from the drive, with a standard "
-        "error (default: what the run's run.yaml says, or auto)", metavar="auto|MPS2",
-        read=word_or_number(AUTO, NOISE), check=check_word_or_number(AUTO, NOISE))] = None
+        f"r.m.s. noise of one reading before rounding, {READING_NOISE.words}; auto: learned from the drive, with a "
+        "standard error (default: what the run's run.yaml says, or auto)", metavar="auto|MPS2",
+        read=word_or_number(AUTO, READING_NOISE), check=check_word_or_number(AUTO, READING_NOISE))] = None
     step_mps2: Annotated[float | None, Option(
         "quantisation step of the readings [m/s2], 0: none (default: what the run's run.yaml says)", ADDED,
         "MPS2")] = None
@@ -489,8 +490,6 @@ GENERATE = Verb(RandomRoadQuestion, "logger.api.roads:random_road")
 
 # --- learn-car ---
 
-_WHEELBASE, _CAR_MASS, _FARTHEST_AHEAD_M = Range(1.5, 5.0, "m"), Range(300.0, 10_000.0, "kg"), 4.0
-
 
 def _ahead(text: str) -> float:
     name, _, value = text.partition("=")
@@ -498,8 +497,8 @@ def _ahead(text: str) -> float:
         ahead_m = float(value)
     except ValueError:
         ahead_m = float("nan")
-    if name.strip() != "ahead_m" or not abs(ahead_m) <= _FARTHEST_AHEAD_M:
-        raise ValueError(f"expected ahead_m=METRES, from -{_FARTHEST_AHEAD_M:g} to {_FARTHEST_AHEAD_M:g}")
+    if name.strip() != "ahead_m" or not abs(ahead_m) <= WHEELBASE.high:
+        raise ValueError(f"expected ahead_m=METRES, from -{WHEELBASE.high:g} to {WHEELBASE.high:g}")
     return ahead_m
 
 
@@ -526,10 +525,10 @@ class LearnCarQuestion(LongQuestion):
 
     drives: Annotated[Runs, Argument("folder of logs, dump, run's folder, drive.csv or recording of a phone",
                                      metavar="DRIVE", read=Path, many=list)]
-    wheelbase_m: Annotated[float, Option("distance between the axles [m]", _WHEELBASE, "M")]
+    wheelbase_m: Annotated[float, Option("distance between the axles [m]", WHEELBASE, "M")]
     _: KW_ONLY
     mass_kg: Annotated[float | None, Option(
-        "mass of the whole car as driven [kg] (default: a typical one, as the IRI does not need it)", _CAR_MASS,
+        "mass of the whole car as driven [kg] (default: a typical one, as the IRI does not need it)", CAR_MASS,
         "KG")] = None
     sensor: Annotated[float | None, Option(
         "ahead_m=M: how far the sensor sits ahead (+) of the car's middle, to 0.2 m (default: near its centre of "

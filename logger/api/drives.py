@@ -38,7 +38,7 @@ from logger.question import Notify, function, silent
 from logger.report.blocks import Block, Blocks, Hint, Lines, Table
 from logger.report.quantities import known, numbers_of
 from logger.roads.iri import doubt_of
-from logger.runs import SKIP_S, UNKNOWN, Past, past_of
+from logger.runs import SKIP_S, SLOWEST_MPS, UNKNOWN, Past, past_of
 from logger.runs import Run as Record
 from logger.simulation import virtual_drive
 from logger.simulation.virtual_drive import SimulatedRuns
@@ -49,6 +49,7 @@ from logger.store.formats.record_checks import EvenRecord, RecordRules, even_col
 from logger.store.formats.vehicle_file import CarModel, check_moves_itself
 from logger.vehicle.compose import Car, with_effect
 from logger.vehicle.effect import Chosen, chosen
+from logger.vehicle.named_parameters import WEAKEST
 from logger.vehicle.structure import Output, Structure, body_point, suspension_travel, tire_deflection, wheel
 from logger.vehicle.uncertain import sized
 from logger.vehicle.vehicle import Vehicle
@@ -338,8 +339,6 @@ def _check_road(run: Run, distance_m: Array, road: Track, model: vehicle_file.Ca
 
 
 _FAR_ABOVE = 1.5
-_MOVING_MPS = 1.0
-_UNCERTAIN = 0.5
 _G_NEAR, _G_CALM_MPS2 = 0.1, 0.5
 
 
@@ -444,7 +443,7 @@ def _sensor_lines(summary: dict[str, Any]) -> list[str]:
         return [f"This drive does not show the sensor's noise. Assumed: {noise:g} m/s2 in a reading, {rounded}"]
     if std is None:
         return [f"Assumed: noise of {noise:g} m/s2 in a reading (--noise), {rounded}"]
-    shown = (f"noise of {noise:.3g} ± {std:.1g} m/s2 in a reading" if std < _UNCERTAIN * noise else
+    shown = (f"noise of {noise:.3g} ± {std:.1g} m/s2 in a reading" if std < WEAKEST * noise else
              f"noise of about {noise:.2g} m/s2 or less in a reading; this drive cannot resolve it")
     return [f"Learned from the drive: {shown}", f"Assumed: {rounded}"]
 
@@ -452,7 +451,7 @@ def _sensor_lines(summary: dict[str, Any]) -> list[str]:
 def _unit_hint(found: Assessment) -> str:
     """What makes one doubt that the readings on the way are in m/s2; empty if nothing does."""
     drive = found.drive
-    moving = np.diff(drive.distance_m, prepend=drive.distance_m[0]) * drive.rate_hz > _MOVING_MPS
+    moving = np.diff(drive.distance_m, prepend=drive.distance_m[0]) * drive.rate_hz > SLOWEST_MPS
     if not moving.any():
         return ""
     mean, rms = float(drive.accel_z_mps2[moving].mean()), float(drive.accel_z_mps2[moving].std())

@@ -15,6 +15,7 @@ from drivers.dump import open_dump
 from drivers.errors import SettingsError
 from drivers.readings import folder_name
 from logger.arrays import Array, Bools
+from logger.bounds import CONFLICT_SIGMA
 from logger.dsp.resample import GRID_RATE_HZ
 from logger.errors import BadInput, as_bad_input
 from logger.estimation.drive_alignment import DriveAlignment
@@ -48,7 +49,6 @@ LEAST_M = 30.0
 _LINE_SCALE_STD = 0.001
 """Of lengths along a line (a judgement: odometers of profilers are checked to one or two thousandths; a receiver's
 speeds, by the Doppler shift, have no scale error to speak of)."""
-_SCALE_SIGMA = 4.0  # standard deviations: one run in 16 000 is so far off by chance (normal distribution)
 _AROUND_M = 150.0  # of the profile, kept before and after what was driven: a model comes to the first sample over it
 
 
@@ -88,7 +88,7 @@ class ExtractedRun:
         """The scale of the speeds where a receiver and a careful measurement of the profile do not differ by as much;
         else None."""
         scale, std = self.speed_scale or (1.0, 0.0)
-        return self.speed_scale if abs(scale - 1) > _SCALE_SIGMA * float(np.hypot(std, _LINE_SCALE_STD)) else None
+        return self.speed_scale if abs(scale - 1) > CONFLICT_SIGMA * float(np.hypot(std, _LINE_SCALE_STD)) else None
 
 
 @dataclass(frozen=True)
@@ -275,11 +275,11 @@ def _off_the_line(line: along_track.MeasuredLine, driven_m: Array, along_m: Arra
     """Why a drive, by fixes (k,), has no pass over a line."""
     if along_track.passes(driven_m, -along_m, aside_m):
         return ": the drive goes along the profile from its end to its beginning"
-    near = aside_m <= along_track.ASIDE_M
+    near = aside_m <= along_track.SEARCH_M
     if not near.any():
         return f": the nearest fix is {aside_m.min():.0f} m from it"
     near_m = np.diff(driven_m)[near[1:] & near[:-1]].sum()
-    return (f": only {near_m:.0f} m of the drive are within {along_track.ASIDE_M:g} m of its "
+    return (f": only {near_m:.0f} m of the drive are within {along_track.SEARCH_M:g} m of its "
             f"{np.ptp(line.distance_m):.0f} m")
 
 

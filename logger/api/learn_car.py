@@ -14,6 +14,7 @@ from logger.api.extraction import even_drives, recorded_dump
 from logger.api.shared_fields import each
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, read_vehicle
+from logger.bounds import CONFLICT_SIGMA, UNUSUAL_SIGMA
 from logger.chart_data import Chart, Curves, Line
 from logger.errors import BadInput, CheckFailed, as_bad_input
 from logger.estimation.drive_spectra import (
@@ -51,7 +52,14 @@ from logger.store.log.log_name import CAR, OwnFile, inside_of, log_name
 from logger.store.log.sidecar import read_sidecar
 from logger.units import STANDARD_GRAVITY_MPS2
 from logger.vehicle.named_parameters import changed, read
-from logger.vehicle.published_cars import NUMBERS, USUAL_MASS_KG, coordinates_of, number_errors, share_of
+from logger.vehicle.published_cars import (
+    NUMBERS,
+    USUAL_MASS_KG,
+    WHEELBASE_ERROR,
+    coordinates_of,
+    number_errors,
+    share_of,
+)
 from logger.vehicle.vehicle import GENERIC
 
 _GIVEN_STD_M, _USUAL_STD_M = 0.1, 0.2
@@ -59,8 +67,6 @@ _GIVEN_STD_M, _USUAL_STD_M = 0.1, 0.2
 front of the cabin."""
 _FEWEST_BLOCKS = 60
 """Two minutes of steady driving (a judgement: less says little more than the prior)."""
-_WRONG_WHEELBASE, _SIGMA = 0.03, 4.0
-"""As a share: a wheelbase is on the car's data sheet to a millimetre, its load moves it by a per cent."""
 _TWO_CARS = 5.0
 """Logarithm of how many times likelier two cars are than one: very strong evidence (R. Kass and A. Raftery, Journal of
 the American Statistical Association 90, 1995). Drives of one simulated car had -12 and less, of two 90 and more."""
@@ -162,7 +168,7 @@ def _check_braking(name: str, drive: drive_file.Drive) -> None:
     felt, gained = felt[known] - felt[known].mean(), gained[known] - gained[known].mean()
     share = float(felt @ gained / (gained @ gained))
     std = float(np.sqrt(((felt - share * gained) ** 2).sum() / (len(felt) - 2) / (gained @ gained)))
-    if abs(share) > max(_LEANING, _SIGMA * std):
+    if abs(share) > max(_LEANING, CONFLICT_SIGMA * std):
         raise CheckFailed(f"{name}: its vertical axis feels {measured(abs(share), std)} times the car's braking: it is "
                           "another axis, or the sensor leans by 30 degrees or more")
 
@@ -302,10 +308,10 @@ def _uneven_dampers(car: LearnedCar) -> Iterator[str]:
     at = COORDINATES.index("dampers.unevenness")
     uneven = float(np.exp(car.x[at]))
     std = uneven * float(car.std[at])
-    if uneven > _SIGMA * std and uneven >= 1:  # such a damper would push the wheel on
+    if uneven > CONFLICT_SIGMA * std and uneven >= 1:  # such a damper would push the wheel on
         yield ("The harmonics of wheel hop are too strong even for dampers that act in one direction only. "
                "A measured street and ridelog diagnose may show what causes them.")
-    elif uneven > _SIGMA * std:
+    elif uneven > CONFLICT_SIGMA * std:
         least = uneven - 2 * std
         factor = (measured((1 + uneven) / (1 - uneven), 2 * std / (1 - uneven) ** 2) if uneven + 2 * std < 1 else
                   f"at least {(1 + least) / (1 - least):.2g}")
@@ -335,7 +341,7 @@ def _check_wheelbase(problem: UnknownCar, car: LearnedCar) -> None:
     free = UnknownCar(problem.spectra, replace(problem.knowledge, wheelbase_std=0.2))
     found = free.fit_of([car.x, *(_moved(car.x, at, step) for step in (-0.1, 0.1))])
     off, std = float(found.x[at] - np.log(problem.knowledge.wheelbase_m)), float(found.std[at])
-    if abs(off) > max(_SIGMA * std, _WRONG_WHEELBASE):
+    if abs(off) > max(CONFLICT_SIGMA * std, UNUSUAL_SIGMA * WHEELBASE_ERROR):
         metres = float(np.exp(found.x[at]))
         raise CheckFailed(f"--wheelbase {problem.knowledge.wheelbase_m:g}: expected the distance that the drives show, "
                           f"{measured(metres, max(metres * std, 0.005))} m: measure it again, hub to hub on one side "
@@ -583,7 +589,7 @@ def _misfits(used: Sequence[_Used], knowledge: CarKnowledge, car: LearnedCar, sp
         bias = np.array([iri_ratio(reading_power(knowledge, x, speed), reading_power(knowledge, car.x, speed), speed,
                                    noise, level) for speed in speeds_mps])
         at = int(np.argmax(abs(np.log(bias)) / errors))
-        if abs(np.log(bias[at])) < _SIGMA * errors[at]:
+        if abs(np.log(bias[at])) < CONFLICT_SIGMA * errors[at]:
             continue
         numbers = [NUMBERS.index(one) for one in _COMPARED[:-1]]
         most = NUMBERS[max(numbers, key=lambda one: abs(x[one] - car.x[one]) / car.std[one])]

@@ -18,11 +18,11 @@ from logger.arrays import Array, Bools
 from logger.errors import BadInput, as_bad_input
 from logger.printable import word
 from logger.records import WindowRecord
+from logger.units import US_PER_S
 
 if TYPE_CHECKING:
     from logger.chart_data import Chart
 
-_US = 1e-6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -92,8 +92,8 @@ def read_log(path: Path | str) -> Log:
     if not rows:
         raise BadInput(f"{path}: expected a log with at least one intact row")
     columns: dict[str, npt.NDArray[Any]] = {
-        "t_s": _US * np.array([row.t_us for row in rows], dtype=np.float64),
-        "utc_s": _US * np.array([row.utc_us for row in rows], dtype=np.float64),
+        "t_s": np.array([row.t_us for row in rows]) / US_PER_S,
+        "utc_s": np.array([row.utc_us for row in rows], dtype=np.float64) / US_PER_S,
         **{name: np.array([getattr(row, name) for row in rows], dtype=np.float64) for name in _NUMBERS},
         **{name: np.array([getattr(row, name) for row in rows]) for name in _WORDS},
     }
@@ -148,7 +148,7 @@ class Dump(Shown):
                     decoder.feed(event.t_us, event.data)
             decoder.flush()
         block = decoder.take()
-        return Samples(block.t_us.astype(np.float64) * _US, block.accel_mps2, block.clipped)
+        return Samples(block.t_us / US_PER_S, block.accel_mps2, block.clipped)
 
     def fixes(self) -> list[Fix]:
         """What the GPS said, epoch by epoch."""
@@ -160,7 +160,7 @@ class Dump(Shown):
     def __repr__(self) -> str:
         sources = {name: sum(event.source == name for event in self.events)
                    for name in dict.fromkeys(event.source for event in self.events)}
-        lasts_s = (self.events[-1].t_us - self.events[0].t_us) * _US if self.events else 0.0
+        lasts_s = (self.events[-1].t_us - self.events[0].t_us) / US_PER_S if self.events else 0.0
         return table(f"Dump {self.path}", [
             ("accelerometer", self.header.accelerometer["driver"], ""), ("vehicle", word(self.header.vehicle), ""),
             ("began", self.header.start_utc or "not known", "UTC" if self.header.start_utc else ""),

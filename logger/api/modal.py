@@ -29,7 +29,7 @@ from logger.modal.decay import decrement_mode
 from logger.modal.driven_car import car_modes
 from logger.modal.mode import FoundMode, ModalResult, pole_rows
 from logger.printable import counted
-from logger.question import COMMON_IRI, COMMON_SPEED_MPS, IRI, SPEED, function
+from logger.question import IRI, SPEED, function
 from logger.report.blocks import SHOWN_ROWS, Block, Blocks, Lines, Section, Table
 from logger.report.quantities import known, measured
 from logger.runs import READING, SKIP_S
@@ -39,6 +39,7 @@ from logger.store.formats.record_checks import SPEED as SPEED_COLUMN
 from logger.store.formats.record_checks import ChannelRecord
 from logger.store.formats.record_file import VERTICAL
 from logger.store.formats.vehicle_file import check_moves_itself
+from logger.units import COMMON_IRI, COMMON_SPEED_MPS
 from logger.vehicle.linearise import known_vehicle
 from logger.vehicle.modes import mode_errors
 from logger.vehicle.uncertain import cars_off

@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from logger.api.log_questions import PassesQuestion, day_us, length_of
 from logger.api.shown import CommandResult
+from logger.bounds import FALSE_SHARE
 from logger.chart_data import Array, Chart, Curves, Line
 from logger.comfort.iso2631 import comfort_word
 from logger.errors import BadInput
@@ -240,8 +241,6 @@ def chains(found: CombinedDrives) -> list[np.ndarray]:
     return np.split(np.arange(len(way)), breaks)
 
 
-SIGNIFICANT = 0.05
-"""Share of false finds among the cells that are said to have changed."""
 MOST_PLACES = 20
 """Rows of a table of places at a terminal, which is looked through, not read."""
 
@@ -325,7 +324,7 @@ def _change_blocks(found: CombinedDrives, change: Changes) -> Iterator[Block]:
     worse, better = words.count("worse"), words.count("better")
     yield Lines([f"Between the two periods the IRI of {counted(len(change.key), 'piece')} of {found.length_m:g} m "
                  f"changed by {change.mean_m_per_km:+.3f} ± {change.mean_std_m_per_km:.3f} m/km on average",
-                 f"{worse} of them got worse, {better} better (at most {SIGNIFICANT:.0%} of these by chance; Benjamini "
+                 f"{worse} of them got worse, {better} better (at most {FALSE_SHARE:.0%} of these by chance; Benjamini "
                  "& Hochberg)"])
     cells = np.searchsorted(found.iri.key, change.key).tolist()
     yield Table(_CHANGE_HEADS, [
@@ -338,14 +337,14 @@ def _change_blocks(found: CombinedDrives, change: Changes) -> Iterator[Block]:
 
 def changed(change: Changes, one: int) -> str:
     """``worse`` or ``better``; nothing where no change is sure."""
-    if not change.false_share[one] <= SIGNIFICANT:
+    if not change.false_share[one] <= FALSE_SHARE:
         return ""
     return "worse" if change.change_m_per_km[one] > 0 else "better"
 
 
 def largest_changes(change: Changes) -> list[int]:
     """The largest of those that are sure, worse or better."""
-    sure = np.flatnonzero(change.false_share <= SIGNIFICANT)
+    sure = np.flatnonzero(change.false_share <= FALSE_SHARE)
     order = sure[np.argsort(-np.abs(change.change_m_per_km[sure]), kind="stable")]
     return list(map(int, order[:MOST_PLACES]))
 

@@ -278,7 +278,9 @@ def caution_zone(hours: float, exponent: int) -> CautionZone:
     raise ValueError(f"the zone is drawn for exponents 2 and 4, not {exponent}")
 
 
-LEAST_TAKEN_HZ = 40.0  # Below, what a record shows ends within the 4 to 12.5 Hz that Wk counts most, or close above
+LEAST_TAKEN_HZ = 40.0
+"""Below, what a record shows (``dsp.whole_record``: to 0.45 of its rate) ends within the 4 to 12.5 Hz that Wk counts
+most, or close above, and beside the 10 to 15 Hz at which wheels hop."""
 
 
 @dataclass(frozen=True)

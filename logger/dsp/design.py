@@ -27,11 +27,11 @@ import numpy.typing as npt
 
 from logger.arrays import Array, Complex
 from logger.dsp.filters import butterworth_sos, frequency_response
+from logger.dsp.resample import PASS_OF_RATE
 from logger.dsp.weightings.weighting import DELAY_SAMPLES, LOWEST_RATE_HZ, Sections, Weighting
 
 TOLERANCE_DB = 0.02
 FIT_OF_RATE = 0.48  # the fit ends at this share of the sample rate
-PROMISE_OF_RATE = 0.4
 PHASE_WEIGHT = 0.3  # radians against nepers
 PHASE_CORNER_OF_RATE = 0.2  # above it the phase fades out of the fit: a road has little to say there
 GUARD_WEIGHT = 0.05  # keeps the magnitude sane between the end of the fit and half the rate
@@ -232,5 +232,5 @@ def _fitted(weighting: Weighting, rate_hz: float, low_pass_zero: float) -> tuple
     early = fit.solve(fit.level(fit.start_from_analog(low_pass_zero)), free_delay=True)
     rows = fit.rows(fit.solve(fit.level(fit.with_all_pass(early)), free_delay=False))
     sections = tuple((b0, b1, b2, a0, a1, a2) for b0, b1, b2, a0, a1, a2 in rows.tolist())
-    error = design_error(weighting, sections, rate_hz, fit.f_hz[fit.f_hz <= PROMISE_OF_RATE * rate_hz])
+    error = design_error(weighting, sections, rate_hz, fit.f_hz[fit.f_hz <= PASS_OF_RATE * rate_hz])
     return sections, error.magnitude_db

@@ -87,11 +87,10 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-from logger.arrays import Array
+from logger.arrays import ROUNDING, Array
 from logger.dsp.filters import BlockFilter, SectionRows
 from logger.units import STANDARD_GRAVITY_MPS2
 
-BLIND = 1e-12
 _POINTS = 256
 _FLOOR = 1e-2
 _LONGEST = 1 << 14  # of responses for a choice; bounds are not taken from them
@@ -99,7 +98,7 @@ _LONGEST = 1 << 14  # of responses for a choice; bounds are not taken from them
 
 def is_blind(b: Array) -> bool:
     """Whether a numerator b0, b1, b2 lets nothing of a steady input through."""
-    return bool(abs(b.sum()) < BLIND * np.abs(b).sum())
+    return bool(abs(b.sum()) < ROUNDING * np.abs(b).sum())
 
 
 def quiet(rows: Array, impulse: Array) -> Array:

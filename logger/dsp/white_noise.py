@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from logger.arrays import Array, Complex
+from logger.bounds import CONFLICT_SIGMA
 
 _BANDS, _LEAST_BANDS = 32, 16
 """Of so many bands at least so many are equally loud where they are noise. Half: the spectrum of a random walk, as of a
@@ -20,9 +21,8 @@ road, is flat in its last third to what a record shows, being 1 / sin^2 of the f
 _MOST_SHARE = 0.03
 """Of the whole deviation, that noise is of no sensor which measures what drives a rig: a louder plateau is a motion
 that was made so, as white noise is on shakers. A judgement."""
-_NEAR, _ABOVE_SIGMA = 20, 4.0
-"""The power at a frequency is the mean of so many on either side, of half a period of the record each. Noise goes
-beyond so many standard deviations of that once in 30,000 frequencies (normal distribution)."""
+_NEAR = 20
+"""The power at a frequency is the mean of so many on either side, of half a period of the record each."""
 EQUAL_SIGMA = 2.5
 """Bands are equally loud up to so many standard deviations of their difference: of 20 bands of noise one is louder by
 chance in eight cases (normal distribution, one-sided)."""
@@ -78,7 +78,8 @@ def without_white_noise(samples: Array) -> Denoised:
         return as_they_are
     width = 2 * _NEAR + 1
     local = np.convolve(np.pad(power, _NEAR, mode="reflect"), np.full(width, 1 / width), mode="valid")
-    gain = np.where(local > noise * (1 + _ABOVE_SIGMA * np.sqrt(2 / width)), 1 - noise / np.maximum(local, noise), 0.0)
+    is_above = local > noise * (1 + CONFLICT_SIGMA * np.sqrt(2 / width))
+    gain = np.where(is_above, 1 - noise / np.maximum(local, noise), 0.0)
     return Denoised(line + _odd_samples(spectrum * gain), float(np.sqrt(noise)), gain)
 
 

@@ -27,8 +27,8 @@ from typing import Any
 
 import numpy as np
 
-from logger.arrays import Array, Bools
-from logger.bounds import time_hint
+from logger.arrays import ROUNDING, Array, Bools
+from logger.bounds import EVEN_SAMPLES, time_hint
 from logger.dsp.weightings.weighting import LOWEST_RATE_HZ
 from logger.estimation.car_response import SPEEDS_PER_E
 from logger.estimation.error_bound import ErrorBound, pooled_r2
@@ -53,11 +53,9 @@ _SMOOTHED_S = 2.0
 _FINEST_RATIO = 2000
 RESOLVED_SHARE = 0.75
 _ORDER = 8
-_NEARLY_SPACINGS = 1e-3
 BACK_M = 1.0
 """A distance may go back so far, as one that is corrected by GPS does."""
 SPEED_CLASS_MPS = 5.0
-_NEARLY = 1e-6
 _WAYS_DIFFER = 0.1
 _LEAST_WAY_M = 10.0  # over less, a distance from GPS may well differ from the integral of the speed
 
@@ -298,7 +296,7 @@ def _runs(pieces: Sequence[RoadPiece]) -> list[list[RoadPiece]]:
     runs: list[list[RoadPiece]] = []
     end_m = float("nan")
     for piece in pieces:
-        if not abs(piece.start_m - end_m) < _NEARLY_SPACINGS * piece.spacing_m:
+        if not abs(piece.start_m - end_m) < EVEN_SAMPLES * piece.spacing_m:
             runs.append([])
         runs[-1].append(piece)
         end_m = piece.start_m + (len(piece.elevation_m) - 1) * piece.spacing_m
@@ -442,7 +440,7 @@ def assess(
 
 def speed_classes(windows: Windows) -> Iterator[tuple[float, Bools]]:
     """The lower end of each class of speed that was driven [m/s], and which windows (w,) are in it."""
-    number = np.floor(windows.speed_mps / SPEED_CLASS_MPS + _NEARLY).astype(int)
+    number = np.floor(windows.speed_mps / SPEED_CLASS_MPS + ROUNDING).astype(int)
     for one in np.unique(number).tolist():
         yield one * SPEED_CLASS_MPS, number == one
 

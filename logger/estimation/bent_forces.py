@@ -12,7 +12,7 @@ from math import sqrt
 
 import numpy as np
 
-from logger.arrays import Array, Complex
+from logger.arrays import ROUNDING, Array, Complex
 from logger.estimation.car_response import HIGHEST_HZ, WAVE_NUMBER_STEPS_CPM, WAVE_NUMBERS_CPM
 from logger.estimation.time_grid import frequencies_hz
 from logger.vehicle.laws import CornerLaws
@@ -24,7 +24,6 @@ _SHARE = _SHARE / _SHARE.sum()
 # Laws are rounded off over at least so much of how far a corner moves: the slope of friction at rest stays within three
 # times that of its stand-in, so that half a step towards what is found leads there.
 _LEAST_ROUNDING = 1 / 3
-_AT_REST_MPS = 1e-9
 _EVERY = 4  # of the samples that the variance is asked at: it is a mean over the block
 
 
@@ -80,7 +79,7 @@ def _beyond(laws: CornerLaws, slopes: CornerSlopes, motion: Array, std: Array) -
     travel, rate and the damper's own rate (3, t) within standard errors (3,)."""
     force = sum(_SHARE @ one for one in _parts(laws, slopes, motion, std)) - slopes.beside_n_s_per_m * motion[1]
     if laws.dry_friction_n:
-        share = motion[1] / max(sqrt(std[1]**2 + laws.friction_transition_mps**2), _AT_REST_MPS)
+        share = motion[1] / max(sqrt(std[1]**2 + laws.friction_transition_mps**2), ROUNDING)
         # nearly its mean over a normal distribution, which is an erf
         force += laws.dry_friction_n * laws.stribeck.times(motion[1]) * np.tanh(
             sqrt(2 / np.pi) * (share * (1 + 0.044715 * share * share)))

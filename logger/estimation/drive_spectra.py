@@ -21,7 +21,8 @@ from zlib import compress, decompressobj, error
 import numpy as np
 import numpy.typing as npt
 
-from logger.arrays import Array, Bools
+from logger.arrays import AT_ONCE, Array, Bools
+from logger.bounds import MOVING_MPS
 from logger.dsp.resample import PASS_OF_RATE
 
 BLOCK_S = 4.0
@@ -29,7 +30,6 @@ BLOCK_S = 4.0
 it; and a road of 20 to 40 m in town, 100 m outside, has about one level."""
 LOWEST_HZ, HIGHEST_HZ = 0.75, 30.0
 """Below it a driver brakes and turns; above it a car with wheels at 10 to 15 Hz passes next to nothing."""
-SLOWEST_MPS = 3.0
 STEADY = 0.1
 """Standard deviation of the speed in a block as a share of it: the wheelbase's interference fades by what is known of
 it (``spread``), the level is a mean."""
@@ -38,7 +38,6 @@ IMPULSIVE = 5.0
 one level, 0.6 its standard deviation in a block, 12 that of a block that a pothole of a quarter second doubles."""
 _WIDENING = 0.06  # of a band above 4 Hz, as a share: a tenth of the width of a wheel's resonance
 _FINE = 2  # points of the model's spectrum for each bin: the window's autocorrelation is as long as two blocks
-_AT_ONCE = 256
 DRIVE_SPECTRA = "drive_spectra"
 """In a sidecar: what is kept of the drives of a session so that their car can be learned of them."""
 MOST_KEPT = 256
@@ -161,11 +160,11 @@ def _blocks(accel_mps2: Array, speed_mps: Array, usable: Bools, rate_hz: float, 
     last = bands()[-1][1]
     passes = middles_hz() + counts() / (2 * BLOCK_S) <= min(PASS_OF_RATE * rate_hz, passed_hz)
     kept = [(np.empty(0), np.empty(0), np.empty(0), np.empty((0, len(firsts))))]
-    for some in np.split(begins, range(_AT_ONCE, len(begins), _AT_ONCE)):
+    for some in np.split(begins, range(AT_ONCE, len(begins), AT_ONCE)):
         rows = some[:, None] + np.arange(length)
         speeds = speed_mps[rows]
         mean = speeds.mean(axis=1)
-        good = usable[rows].all(axis=1) & (mean > SLOWEST_MPS) & (speeds.std(axis=1) < STEADY * mean)
+        good = usable[rows].all(axis=1) & (mean > MOVING_MPS) & (speeds.std(axis=1) < STEADY * mean)
         mean = speeds @ under_taper
         spread = np.sqrt((speeds - mean[:, None]) ** 2 @ under_taper)
         readings = accel_mps2[rows[good]]
@@ -264,6 +263,6 @@ def spectra_of_fields(fields: Any) -> DriveSpectra:
         raise ValueError("expected whole blocks")
     rows = np.frombuffer(raw, np.uint8).reshape(-1, size)
     speed, spread = rows[:, 2] + 256.0 * rows[:, 3], rows[:, 4].astype(float)
-    if speed.min() < 100 * SLOWEST_MPS - 1:
+    if speed.min() < 100 * MOVING_MPS - 1:
         raise ValueError("expected speeds of a car that drives")
     return _of_drive(speed / 100, spread / 1000, _FLOOR * 10 ** (rows[:, 5:] / 10), noise)

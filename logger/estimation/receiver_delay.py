@@ -39,6 +39,7 @@ from math import hypot, sqrt
 import numpy as np
 
 from logger.arrays import Array
+from logger.estimation.time_grid import SLOWEST_MPS
 
 Strength = tuple[float, float, float, float]
 Rows = tuple[Array, Array, Array]
@@ -50,9 +51,6 @@ GROUPS = 12
 """Blocks in turn belong to one of so many groups, each of which is left out once."""
 FEWEST_BLOCKS = 6
 FEWEST_FIXES = 10
-SLOWEST_MPS = 1.0
-"""Slower than this receivers hold their speed at zero, and have no sign for a car that backs up: such a fix counts only
-where those before and after it say as well that the car stands."""
 EARLY_BLOCKS = 8
 """So many are kept, and weighed once more when all of them have given the delay: at first it is a guess."""
 THINNED_S = 0.5
@@ -65,7 +63,8 @@ HILL_S = (3.0, 9.0)
 STRENGTHS = tuple(product((0.03, 0.06, 0.12, 0.24), (1e-4, 3e-3, 3e-2), (0.05, 0.15, 0.4), HILL_S))
 """r.m.s. of e [m/s]; variance of the random walk per second [(m/s)2/s]; r.m.s. of the hills [m/s2], their time [s]."""
 _USUAL = (0.12, 3e-3, 0.15, 9.0)
-_FREEDOM = 4.0
+FREEDOM = 4.0
+"""Of Student's t, of what a receiver says: one in twenty lies beyond three deviations."""
 _ROUNDS = 3
 _SEEN = 25.0
 _NEAR = 3
@@ -328,7 +327,7 @@ def _weights(residual: Array, t_s: Array, strength: Strength, weight: Array) -> 
     spread = np.maximum(np.diag(inverse), 1e-9)
     off = (inverse @ residual) / spread  # from what the others say, whose variance is 1 / spread
     variance = 1 / spread - strength[0] ** 2 / weight + strength[0] ** 2
-    return (_FREEDOM + 1) / (_FREEDOM + off**2 / np.maximum(variance, 1e-9))
+    return (FREEDOM + 1) / (FREEDOM + off**2 / np.maximum(variance, 1e-9))
 
 
 # --- all blocks ---

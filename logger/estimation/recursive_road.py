@@ -14,6 +14,7 @@ from math import exp, log, pi
 import numpy as np
 
 from logger.arrays import Array, Bools, Complex
+from logger.bounds import UNUSUAL_SIGMA
 from logger.estimation.car_response import steady_motion
 from logger.estimation.iri_posterior import vehicle_error_variance
 from logger.estimation.level_response import RAISED_EVERY, RISE, Answer, LevelResponse
@@ -51,7 +52,6 @@ _COARSE_ROUNDS, _COARSE_STEPS = 2, 2
 # level moves by less than changes an IRI by 3 %, and the variances of bounds by less than 3 % (r.m.s.). Nowhere else do
 # these move. With rounds counted, not measured, sections at 20 to 30 mph that steps hide read 11 to 14 % too smooth.
 _MORE_ROUNDS, _LEVEL_RESTS, _BOUNDS_REST = 10, 0.06, 0.03
-_MOST_DEVIATIONS = 3.0
 _LEAST_SHOWN = 1e-3
 _SMOOTHEST_SOLVED = -6.0  # an IRI of 0.12: a bump on a smoother road takes more steps of the solver
 _SETTLED_SAMPLES = 1000  # behind those that show the noise: their bounds have gone through ten rounds by then
@@ -322,7 +322,7 @@ class FollowedRoad:
         if learns or before is None:
             resolved = mean_resolved(gain, (local * ratio)[seen > 0])
             # A lone obstacle is no level: an innovation counts with at most some expected deviations.
-            most = _MOST_DEVIATIONS * np.sqrt(2 * float(resolved.sum()) / block.count)
+            most = UNUSUAL_SIGMA * np.sqrt(2 * float(resolved.sum()) / block.count)
             white = np.clip(solution.innovations / np.sqrt(local), -most, most)
             power = np.abs(np.fft.rfft(white)) ** 2 / block.count
             # The level goes with the roughness along the block: two that follow the same slope would overshoot.

@@ -25,6 +25,7 @@ from logger.estimation.car_response import CarResponse, steady_motion
 from logger.estimation.road_spectrum import RoadSpectrum
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.time_grid import frequencies_hz
+from logger.vehicle.named_parameters import WEAKEST
 
 _LINES = 1024  # of time that spectra are taken over: ten seconds at 100 Hz, finer than the axles' comb in them
 _LAGS_S = 1.0
@@ -36,7 +37,6 @@ _LEVEL_TRIAL = 0.3  # of the log level, to see what it does to a ride
 # by which a ride is off beyond its error, times the noise and what blurs the steps, both in steps. Median of ten rows
 # whose noise is 0.03 to 0.08 steps and whose blur 0.13 to 0.86, each within a factor of 2.3; at 0.16 steps nothing is.
 _ROUGH_SHARE = 2.5e-3
-_MOST_ROUGH = 0.5  # a value that may be off by so much in one standard error is none
 
 
 @dataclass(frozen=True)
@@ -133,7 +133,7 @@ class RidePosterior:
         """
         knows, louder = self.knowledge(place)
         rough = hypot(_rough_log_std(knows.accel_variance, place.sensor), place.scale_log_std)
-        if rough > _MOST_ROUGH:
+        if rough > WEAKEST:
             return None
         numbers = np.flatnonzero(inside)
         span = slice(max(int(numbers[0]) - self._running + 1, 0), int(numbers[-1]) + 1)

@@ -13,6 +13,7 @@ import numpy as np
 from logger.arrays import Array
 from logger.estimation.scored_variances import LARGEST_STEP
 from logger.roads.iso8608 import CM3_M3, REFERENCE_N0_CPM, gd_n0_from_iri
+from logger.units import COMMON_IRI
 
 PIVOT_CPM = 0.2
 """Where a level is counted: in the middle of the waves that shake a car."""
@@ -59,7 +60,7 @@ def log_waves(wave_number_cpm: Array) -> Array:
     return np.log(np.maximum(wave_number_cpm, FLATTENED_BELOW_CPM) / PIVOT_CPM)
 
 
-COMMON_ROAD = RoadSpectrum.of_iri(2.5)
+COMMON_ROAD = RoadSpectrum.of_iri(COMMON_IRI)
 
 
 def learned(

@@ -25,7 +25,7 @@ from functools import cached_property, lru_cache
 
 import numpy as np
 
-from logger.arrays import Array, Bools
+from logger.arrays import ROUNDING, Array, Bools
 from logger.estimation.road_spectrum import COMMON_DEVIATIONS
 from logger.estimation.scored_variances import FORGOTTEN, LARGEST_STEP, ScoredVariances
 from logger.estimation.time_grid import neighbours
@@ -41,7 +41,6 @@ _COMMON = 4.0  # points, before the scatter is known, and never fewer
 _MOST_COMMON = 100.0  # w keeps within 14 %, which costs nothing
 _LEAST_OF_MEAN = 0.1  # a place that shows less says nothing of the scatter
 _TAKEN_OVER = 0.6  # of a new scale, so that it does not overshoot
-_LEAST_INFORMATION = 1e-9
 _TABLE_STEP = 0.5
 _CLASSES = 8
 # Towards the most probable level, where bounds follow it late: until they do, the curvature is the expected one, and
@@ -193,7 +192,7 @@ class RoadLevels:
             self._learn_scatter(power, weight, gain * np.exp(float(seen @ strength / seen.sum())), seen > 0)
         fresh = np.log((self._common + power) / (self._common + weight))
         fresh = _TAKEN_OVER * fresh + (1 - _TAKEN_OVER) * (log_before - level)
-        self._first, self._log_scale = first, np.where(near > _LEAST_INFORMATION, fresh, 0.0)
+        self._first, self._log_scale = first, np.where(near > ROUNDING, fresh, 0.0)
         self._scale_error = 2 / (self._common + weight)
         self._excess = 0.5 * self._scale_error * (weight - self._common) / (weight + self._common)
 
@@ -222,9 +221,9 @@ class RoadLevels:
         relative = np.maximum(squares[chosen] * np.exp(-now[at]), np.minimum(freedom - weight, 0.0)[chosen])
         freedom, half = freedom[chosen], 0.5 * self._common * each[chosen]
         slope = np.bincount(at, half * (relative - freedom) / (self._common + np.maximum(relative, 0.0)), total)
-        bend = np.maximum(np.bincount(at, half * freedom / (self._common + freedom), total), _LEAST_INFORMATION)
+        bend = np.maximum(np.bincount(at, half * freedom / (self._common + freedom), total), ROUNDING)
         if self.curvature is not None:
-            bend = np.maximum(self.curvature * bend, _LEAST_INFORMATION)
+            bend = np.maximum(self.curvature * bend, ROUNDING)
         level, shown, information = (np.concatenate(pair) for pair in zip(
             old.cells(begin, edge - begin), (now, now + slope / bend, bend), strict=True))
         self._level = _Level(begin, level, shown, information, edge, prior, state, state_covariance)
@@ -290,7 +289,7 @@ def resolved_shares(strength: Array, gain: Array, seen: Array, free: float | Non
     return resolved, freedom
 
 
-_neighbours = lru_cache(maxsize=32)(neighbours)  # kept, for there are few counts and one reach
+_neighbours = lru_cache(neighbours)  # kept, for there are few counts and one reach
 
 
 @lru_cache(maxsize=16)

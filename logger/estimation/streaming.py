@@ -31,6 +31,7 @@ from logger.estimation.road_solver import ENTRY_S, Block, TimeGrid
 from logger.estimation.road_spectrum import COMMON_ROAD, RoadSpectrum
 from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.estimation.time_grid import RATE_HZ, RoadSamples, between
+from logger.units import COMMON_SPEED_MPS
 from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.linearise import KnownCar, MovedCar
 
@@ -47,7 +48,6 @@ _FIRST_SAMPLES = 1000
 # Of a car whose laws are not linear: turns of road and forces in each block, and how far towards the forces each goes.
 _TURNS, _FIRST_TURNS, _WAY = 2, 4, 0.5
 _KEPT = 24  # of its answers to other roads at other speeds, some 0.4 MB each
-_COMMON_MPS = 15.0  # with the road that is common, until it is known what is driven
 
 
 @dataclass(frozen=True)
@@ -155,7 +155,7 @@ class RoadEstimator:
         self._ride = None if ride_response is None else RidePosterior(ride_response, BLOCK_SAMPLES, RATE_HZ)
         self._road = FollowedRoad(sensor, self._spacing_m, vehicle_error, noise, noise_log_std)
         self._kept: dict[LinearCar, _Answers] = {}
-        self._answers = self._answers_on(COMMON_ROAD, _COMMON_MPS)
+        self._answers = self._answers_on(COMMON_ROAD, COMMON_SPEED_MPS)
         self._ride_ahead_m = ride_ahead_m
         self._restart()
 

@@ -16,6 +16,8 @@ from logger.dsp.resample import GRID_RATE_HZ
 
 RATE_HZ = float(GRID_RATE_HZ)
 SLOWEST_MPS = 1.0
+"""Slower than this receivers hold their speed at zero, and have no sign for a car that backs up: such a fix counts only
+where those before and after it say as well that the car stands."""
 
 
 @dataclass(frozen=True)

@@ -9,13 +9,13 @@ import numpy.typing as npt
 
 from logger.arrays import Array
 from logger.dsp.repeated_samples import stretches_of
+from logger.estimation.receiver_delay import FREEDOM
 from logger.geodesy import east_and_north_m
 from logger.lab.likelihood.lag import SLOWEST_MPS, lags, offset_by_correlation_m
 from logger.profiles.track import Track
+from logger.roads.road_matching import SEARCH_M
 from logger.runs import RECEIVER_ERROR_LASTS_S, Run
 
-ASIDE_M = 25.0
-"""No receiver with a fix is farther off among houses, but for moments; a parallel street is."""
 _APART_M = 15.0
 """By so much the place on the line and the way that was driven may differ from fix to fix on one pass."""
 _LEAST_FIXES = 5
@@ -90,7 +90,7 @@ def passes(driven_m: Array, along_m: Array, aside_m: Array) -> list[Pass]:
     """The passes of a drive, by fixes (k,): how far the car had come, the nearest place of the line, how far aside. By
     places with their signs turned, those of a drive from the line's end to its beginning."""
     offset_m = along_m - driven_m
-    on = aside_m <= ASIDE_M
+    on = aside_m <= SEARCH_M
     together = on[1:] & on[:-1] & (np.abs(np.diff(offset_m)) <= _APART_M)
     found = []
     for first, last in zip(*stretches_of(together), strict=True):
@@ -104,7 +104,6 @@ Ints = npt.NDArray[np.intp]
 
 NEAREST_FIXES_S = 0.02
 """Fixes nearer to each other than that are one: no receiver sends 50 a second."""
-_FREEDOM = 4.0  # of Student's t, of places: one in twenty lies beyond three deviations
 _WILD = 5.0  # deviations of a speed: noise alone is never so far off, and braking is not taken for it
 _ROUNDS = 3
 _LEAST_NOISE_MPS = 0.005  # of a speed that is written in thousandths of a knot
@@ -244,7 +243,7 @@ def _fitted(speeds: Observations, places: Observations, walk: float, noise_mps: 
         weights = _without_wild((state[:, 1] - speeds.value) / deviation)
         at = TrackMotion(speeds.time_s, state, walk, noise_mps)
         off = (at._curve(places.time_s, 0) - places.value) / places.deviation
-        seen = np.asarray((_FREEDOM + 1) / (_FREEDOM + off**2))
+        seen = np.asarray((FREEDOM + 1) / (FREEDOM + off**2))
     return TrackMotion(speeds.time_s, state, walk, noise_mps)
 
 

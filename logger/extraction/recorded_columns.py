@@ -21,6 +21,7 @@ import numpy.typing as npt
 
 from logger.arrays import Array, Bools
 from logger.bounds import FASTEST_HZ, LONGEST_HOLE_S, ROUNDING_STEPS
+from logger.comfort.iso2631 import LEAST_TAKEN_HZ
 from logger.dsp.repeated_samples import (
     burst_ends,
     find_holds,
@@ -75,8 +76,6 @@ def _gaps(time_s: Array, longest_s: float) -> list[tuple[float, float]]:
     return [(float(time_s[index]), float(time_s[index + 1])) for index in wide]
 
 
-LEAST_RATE_HZ = 40.0
-"""Wheels hop at 10 to 15 Hz; a record shows what lies below 0.45 of its rate (``dsp.whole_record``)."""
 _FEWEST = 20  # samples of a piece: the filter's ends are continued by guesses
 _FEW_STEPS = 3.5
 _INSTANT_S = 1e-6
@@ -138,10 +137,10 @@ def even_samples(time_s: Array, samples: Array, rate_hz: float) -> EvenSamples:
     if own_hz > FASTEST_HZ:
         raise ValueError(f"expected at most {FASTEST_HZ:g} samples a second, found {own_hz:.3g}: is the unit of the "
                          "time right?")
-    if own_hz < LEAST_RATE_HZ:
+    if own_hz < LEAST_TAKEN_HZ:
         also = f" written at {len(time_s) / (time_s[-1] - time_s[0]):.3g} Hz" if dropped > 0 else ""
-        raise ValueError(f"expected {LEAST_RATE_HZ:g} measured samples a second or more, found {own_hz:.3g}{also}: set "
-                         "the program to a higher rate")
+        raise ValueError(f"expected {LEAST_TAKEN_HZ:g} measured samples a second or more, found {own_hz:.3g}{also}: "
+                         "set the program to a higher rate")
     laid = [_laid(*one, own_hz, rate_hz) for one in taken]
     times_s, values, present, ends_met = (np.concatenate(part) for part in list(zip(*laid, strict=True))[:4])
     return EvenSamples(times_s, values, present, ends_met, own_hz, dropped, all(one[4] for one in laid),

@@ -38,10 +38,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from logger.arrays import AT_ONCE, Array
+
 Codes = npt.NDArray[np.intp]
 
-_BLOCK = 4096
 _MOST_SESSIONS = 50_000
 """Whose sums are squared in whole; of more, what their roads add to that comes from a part of them, evenly chosen."""
 _LEAST_INFORMATION = 1e-6
@@ -189,8 +189,8 @@ class Elimination:
                         for one in (self.weight, self.weight * self.time))
         to_level, to_slope = (one.toarray() if _is_dense(one) else one for one in (self._to_level, self._to_slope))
         out, of_chosen = np.zeros((self.cars + 1, self.cars + 1)), np.zeros(self.cars + 1)
-        for start in range(0, len(chosen), _BLOCK):
-            block = slice(start, start + _BLOCK)
+        for start in range(0, len(chosen), AT_ONCE):
+            block = slice(start, start + AT_ONCE)
             some, car = chosen[block], passes.car_of_session[chosen[block]]
             sums = level[block] @ to_level + slope[block] @ to_slope
             sums = -np.asarray(sums if isinstance(sums, np.ndarray) else sums.todense())
@@ -229,8 +229,8 @@ def _product(one: Any, other: Any) -> Array:
     if not _is_dense(one):
         return np.asarray((one.T @ other).todense())
     out = np.zeros((one.shape[1], other.shape[1]))
-    for start in range(0, one.shape[0], _BLOCK):
-        out += one[start : start + _BLOCK].toarray().T @ other[start : start + _BLOCK].toarray()
+    for start in range(0, one.shape[0], AT_ONCE):
+        out += one[start : start + AT_ONCE].toarray().T @ other[start : start + AT_ONCE].toarray()
     return out
 
 

@@ -17,6 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.disk import open_regular
+from logger.arrays import Array
 from logger.errors import BadInput
 from logger.files import read_bounded, replace_bytes
 from logger.fleet.dataset import ROW_TYPES, Dataset
@@ -215,7 +216,6 @@ def joined_columns(parts: list[Mapping[str, npt.NDArray[Any]]]) -> dict[str, npt
     return {name: np.concatenate([part[name] for part in parts]) for name in parts[0]}
 
 
-Array = npt.NDArray[np.float64]
 Columns = dict[str, npt.NDArray[Any]]
 Keyed = Callable[[Array, Array, Array, npt.NDArray[np.intp]], npt.NDArray[np.int64]]
 """Latitudes, longitudes, directions (n,) [degrees] and numbers of drives, to keys of roads (n,)."""

@@ -20,22 +20,15 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array
+from logger.bounds import FALSE_SHARE
 from logger.errors import BadInput
 from logger.exchange.layer import Feature, Geometry, Layer, attributes, cut, format_of, iri_title
 from logger.files import make_folder, whole_folder, write_file, write_text
 from logger.fleet.dataset import Engine
 from logger.fleet.ingest import Counts
 from logger.fleet.road_map import SEGMENT_M, RoadPieces
-from logger.fleet.summary import (
-    FALSE_SHARE,
-    SECTION_M,
-    FleetFigures,
-    RoadTable,
-    change_found,
-    gains_table,
-    grouped,
-    history,
-)
+from logger.fleet.summary import SECTION_M, FleetFigures, RoadTable, change_found, gains_table, grouped, history
 from logger.geodesy import EARTH_RADIUS_M
 from logger.left_out import LeftOut, left_out_json, left_out_lines
 from logger.printable import counted
@@ -204,7 +197,6 @@ def _line(lat_deg: float, lon_deg: float, heading_deg: float, length_m: float) -
     return cut(((lon_deg - east, lat_deg - north), (lon_deg + east, lat_deg + north)))
 
 
-Array = npt.NDArray[np.float64]
 Codes = npt.NDArray[np.int64]
 
 DEEPEST = 15  # Where a segment of 66 ft is some 6 pixels long at middle latitudes

@@ -18,11 +18,11 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
+from logger.arrays import Array
 from logger.geodesy import EARTH_RADIUS_M
-from logger.roads.road_matching import on_sphere
+from logger.roads.road_matching import SEARCH_M, on_sphere
 from logger.units import MILE_M
 
-Array = npt.NDArray[np.float64]
 Keys = npt.NDArray[np.int64]
 
 SEGMENT_M = MILE_M / 80  # Side of a cell, and length of a segment: eight make the 0.1 mi of 23 CFR 490
@@ -99,7 +99,6 @@ def _fine(keys: Keys) -> tuple[Keys, Keys]:
 
 _PLACE_STD_M = 4.07  # Of a receiver across the road (Newson and Krumm 2009, section 4)
 _HEADING_STD_DEG = 20.0  # Of the direction between windows 50 ft apart with fixes some metres off
-_REACH_M = 30.0
 _CANDIDATES = 12
 
 
@@ -191,7 +190,7 @@ class RoadMap:
         forward = (np.abs(turn_deg) <= 90.0).astype(np.int64)
         turn_deg = np.minimum(np.abs(turn_deg), 180.0 - np.abs(turn_deg))
         cost = (off_m / _PLACE_STD_M) ** 2 + (turn_deg / _HEADING_STD_DEG) ** 2
-        return piece, np.where(off_m <= _REACH_M, cost, np.inf), forward
+        return piece, np.where(off_m <= SEARCH_M, cost, np.inf), forward
 
 
 def _of_neighbours(way: npt.NDArray[np.int64], cost: Array, drive: npt.NDArray[np.intp]) -> Array:

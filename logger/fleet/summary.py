@@ -22,6 +22,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.arrays import Array, Bools
+from logger.bounds import FALSE_SHARE
 from logger.fleet.car_biases import CarBiases, RoadPasses, car_biases
 from logger.fleet.dataset import Engine
 from logger.fleet.road_map import ON_MAP, SEGMENT_M, RoadPieces, block_of, cell_keys, section_of
@@ -200,7 +201,6 @@ def _inverse_trigamma(value: float) -> float:
 
 Keys = npt.NDArray[np.int64]
 
-FALSE_SHARE = 0.05  # Of false ones among the changes that are called significant
 POOR_M_PER_KM = FAIR_TO_IN_PER_MI * INCH_PER_MILE_M_PER_KM
 SECTION_M = MILE_M / 10
 MOST_PASSES = 1_000_000

@@ -23,15 +23,13 @@ from typing import Protocol
 
 import numpy as np
 
-from logger.arrays import Array
+from logger.arrays import ROUNDING, Array
 from logger.dsp.filters import DecimatingLowPass
 from logger.dsp.linear_prediction import PredictionWhitener, burg, ladder, levinson
 
 LEAST_SHARE = 1e-5
 """Noise is never taken for less than this share of the measurement: predictions are not more accurate themselves, and
 what they leave of a record without noise is no process at all."""
-LEAST_SHARE_SIMULATED = 0.002
-"""The same where predictions are stepped through time: two right simulations of one car differ by so much."""
 ROAD_LEVEL = "gd_n0_cm3"
 _MOST_ORDER = 60
 _SAMPLES_PER_ORDER = 20
@@ -39,7 +37,6 @@ _MEMORY_S, _FILTER_MEMORY_S = 4.0, 1.0
 _GRID = 8192
 # The level of the road against that of the sensor is searched over so many powers of e.
 _RATIO_LOGS = 40.0
-_RATIO_CLOSE = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,7 +215,7 @@ def _levels(residuals: Sequence[Array], roads: Sequence[Array], sensor: Array, f
         return float(np.log(shape * level).mean())
 
     ratio = float(minimize_scalar(deviance, bounds=(-_RATIO_LOGS / 2, _RATIO_LOGS / 2), method="bounded",
-                                  options={"xatol": _RATIO_CLOSE}).x)
+                                  options={"xatol": ROUNDING}).x)
     level = level_of(ratio)[1]
     return float(np.exp(ratio)) / unit * level, max(level, floor**2)
 

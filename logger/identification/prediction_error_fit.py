@@ -19,19 +19,13 @@ from typing import Protocol
 
 import numpy as np
 
-from logger.arrays import Array
+from logger.arrays import ROUNDING, Array
+from logger.bounds import DISCREPANCY
 from logger.dsp.filters import DecimatingLowPass
-from logger.fitting.information_matrix import inverse_with_prior
+from logger.fitting.fisher_scoring import inverse_with_prior
 from logger.fitting.levenberg_marquardt import Minimum, minimise
 from logger.identification.identifiability import Finding, NotIdentifiable, beside, statistical, structural, unexplained
-from logger.identification.noise_models import (
-    LEAST_SHARE,
-    LEAST_SHARE_SIMULATED,
-    Autoregressive,
-    NoiseModel,
-    White,
-    Whitening,
-)
+from logger.identification.noise_models import LEAST_SHARE, Autoregressive, NoiseModel, White, Whitening
 from logger.runs import normalised_rms
 from logger.vehicle.named_parameters import Coordinates, Free
 
@@ -39,7 +33,6 @@ _LONGEST_STEP = 1.0
 # Converged: what is left of the way is this share of a standard error; of a model that is stepped through time, this.
 _CLOSE, _CLOSE_SIMULATED, _CLOSE_NOISE = 1e-5, 1e-2, 1e-4
 _MOST_STEPS, _MOST_NOISE_ROUNDS = 100, 20  # of one descent; of noise model and numbers in turn
-_AT_BOUND = 1e-6
 _FAR = 3.0
 
 
@@ -62,7 +55,7 @@ class Predictor(Protocol):
 
 def least_share(model: Predictor) -> float:
     """The residual is taken for no less than this share of the measurement, as predictions are no better."""
-    return LEAST_SHARE if model.exact else LEAST_SHARE_SIMULATED
+    return LEAST_SHARE if model.exact else DISCREPANCY
 
 
 @dataclass(frozen=True)
@@ -233,7 +226,7 @@ class _FitProblem:
         chosen = [first, *({**first, **more} for more in self.options.starts)]
         starts = [self.coordinates.of(np.array([start[one.name] for one in self.free])) for start in chosen]
         for start in starts:
-            if not ((start >= self.low - _AT_BOUND) & (start <= self.high + _AT_BOUND)).all():
+            if not ((start >= self.low - ROUNDING) & (start <= self.high + ROUNDING)).all():
                 raise ValueError("expected every start between its bounds")
         return starts
 
@@ -313,7 +306,7 @@ def _result(problem: _FitProblem, point: _ResidualsAt, noise: Whitening, iterati
     slopes = noise(problem.slopes(point.x))
     relative = _covariance(problem, point, slopes)
     at_bound = [one.name for one, x, low, high in zip(problem.free, point.x, problem.low, problem.high, strict=True)
-                if (x - low < _AT_BOUND and not (one.may_be_0 and one.low == 0)) or high - x < _AT_BOUND]
+                if (x - low < ROUNDING and not (one.may_be_0 and one.low == 0)) or high - x < ROUNDING]
     values = problem.coordinates.values(point.x)
     weakest = [one.weakest_at(value) for one, value in zip(problem.free, values, strict=True)]
     if findings := (problem.structural_findings(point) or statistical(names, relative, np.array(weakest))

@@ -19,7 +19,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from logger.arrays import Array, Complex
-from logger.fitting.information_matrix import inverse_with_prior
+from logger.bounds import CONFLICT_SIGMA
+from logger.fitting.fisher_scoring import inverse_with_prior
 from logger.identification.drive_model import DriveModel
 from logger.identification.noise_models import ROAD_LEVEL, PredictionWhitener
 from logger.identification.prediction_error_fit import Fit
@@ -31,7 +32,6 @@ from logger.vehicle.simulate import recorder_gain
 
 _MOST_SAMPLES, _BEFORE_SAMPLES = 1500, 300
 _GRID_STEP_M, _GRID_SAMPLES = 0.02, 32_768
-_CERTAIN = 4.0  # standard deviations of what independent roads have in common by chance
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +67,7 @@ def with_common_roughness(model: DriveModel, fit: Fit) -> CommonRoughness:
             size += float((common**2).sum())
             part = one.slopes.T @ common @ other.slopes
             crossed += part + part.T
-    if likeness < _CERTAIN * np.sqrt(size):
+    if likeness < CONFLICT_SIGMA * np.sqrt(size):
         return alone
     share = min(likeness / size, 1.0)
     scale = Coordinates(fit.free).slopes(values)

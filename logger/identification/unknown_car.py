@@ -22,7 +22,7 @@ from statistics import NormalDist
 
 import numpy as np
 
-from logger.arrays import Array, Complex
+from logger.arrays import AT_ONCE, Array, Complex
 from logger.estimation.car_response import HIGHEST_HZ, WAVE_NUMBER_STEPS_CPM, WAVE_NUMBERS_CPM, golden_car_slope
 from logger.estimation.drive_spectra import INDEPENDENT, DriveSpectra, counts, expected, grid_hz, middles_hz
 from logger.estimation.road_spectrum import PIVOT_CPM
@@ -49,7 +49,6 @@ _NEIGHBOURS = 10  # blocks: 20 s
 _HOPS_APART = 0.15  # of the logarithm
 _ALIKE = 0.1  # of logarithms of evidence: a search stops where a round gains less than a hundredth of it
 _LONGEST_STEP = 0.3  # of a coordinate in a round
-_AT_ONCE = 4096
 _HOLE_M = 0.75
 """Length of a pothole: 0.15 to 1 m and more across (J. Miller and W. Bellinger, Distress Identification Manual,
 FHWA-RD-03-031, 2003, counts those of 0.15 m and more)."""
@@ -438,8 +437,8 @@ class _Step:
         self._score = np.zeros((drives, len(x) + 1))
         self._eliminated = np.empty((count, 2, len(x) + 1))
         self.block_scores = np.empty((count, len(x) + 1))
-        for low in range(0, count, _AT_ONCE):
-            self._take(slice(low, low + _AT_ONCE), gains, slopes)
+        for low in range(0, count, AT_ONCE):
+            self._take(slice(low, low + AT_ONCE), gains, slopes)
 
     def _take(self, part: slice, gains: Array, slopes: Array) -> None:
         """Blocks are eliminated: of each the score and the information of its drive's waviness and the car."""

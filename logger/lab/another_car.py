@@ -16,10 +16,11 @@ from functools import partial
 import numpy as np
 
 from logger.arrays import Array
+from logger.bounds import CONFLICT_SIGMA, UNUSUAL_SIGMA
 from logger.lab.diagnosis import obstacles_of
 from logger.lab.likelihood.map_fit import align, fit
 from logger.lab.likelihood.posterior import Posterior
-from logger.lab.likelihood.priors import CONFLICT_SIGMA, UNUSUAL_SIGMA, Tolerance
+from logger.lab.likelihood.priors import Tolerance
 from logger.lab.selection.candidate_fit import CandidateFit
 from logger.lab.selection.screening import Baseline, Screened, misalignment
 from logger.lab.selection.stepwise import Search

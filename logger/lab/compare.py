@@ -13,13 +13,12 @@ from functools import cached_property
 import numpy as np
 
 from logger.arrays import Array
-from logger.lab.likelihood.noise_floor import floor_error, sensor_noise_with_rounding
+from logger.bounds import DISCREPANCY
+from logger.lab.likelihood.noise_floor import Repeats, find_repeats, floor_error, sensor_noise_with_rounding
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
-from logger.lab.likelihood.repeats import Repeats, find_repeats
 from logger.lab.likelihood.standard_errors import standard_errors
-from logger.lab.likelihood.whittle import DISCREPANCY
 from logger.lab.residual_tests import run_residual_tests
 from logger.lab.residual_tests.tests import ResidualEvidence, ResidualTestResult, ResidualTestResults
 from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown

@@ -15,6 +15,7 @@ from types import MappingProxyType
 
 import numpy as np
 
+from logger.bounds import UNUSUAL_SIGMA
 from logger.lab.likelihood.distance_error import signals_off
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import fit_model
@@ -28,7 +29,7 @@ from logger.lab.likelihood.noise_floor import (
     signal_errors_of,
 )
 from logger.lab.likelihood.posterior import Posterior, State
-from logger.lab.likelihood.priors import UNUSUAL_SIGMA, Tolerance
+from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import StandardErrors, deviations_from_null, standard_errors
 from logger.lab.likelihood.whittle import UNEXPLAINED

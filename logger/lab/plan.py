@@ -43,7 +43,7 @@ from operator import add
 import numpy as np
 import numpy.typing as npt
 
-from logger.arrays import Array
+from logger.arrays import ROUNDING, Array
 from logger.dsp.resample import GRID_RATE_HZ
 from logger.lab.diagnosis import obstacles_of
 from logger.lab.likelihood.distance_error import USUAL, ErrorSize
@@ -340,7 +340,6 @@ square is the difference of the two scores."""
 _MOST_TRIALS = 4
 """Trials of an effect besides its usual values, spread over those that a search begins at: they distinguish another
 shape of it from another effect; all of them would take three times as long."""
-_TINY = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -386,7 +385,7 @@ class Outlook:
 
     def scaled_to(self, detectability: Array) -> Outlook:
         """The outlook with other detectabilities (e,); what remains of each is scaled in proportion."""
-        share = detectability / np.maximum(self.detectability, _TINY)
+        share = detectability / np.maximum(self.detectability, ROUNDING)
         return Outlook(detectability, self.pairwise * share[:, None])
 
     @property
@@ -429,7 +428,7 @@ def outlook(settings: EffectGrid, information: FisherInformation, precision: Arr
     ``columns``."""
     marginal, costs = _marginal(information, precision)
     own = np.maximum(np.einsum("sii->si", marginal), 0.0)
-    explained = marginal[:, columns] ** 2 / np.maximum(own, _TINY)[:, None]
+    explained = marginal[:, columns] ** 2 / np.maximum(own, ROUNDING)[:, None]
     most = np.maximum.reduceat(explained, settings.first, axis=2)
     np.einsum("sii->si", most)[:] = 0.0
     pairwise = (own[:, columns, None] - most + costs[:, None, None]).min(axis=0)

@@ -5,7 +5,7 @@ coarse sensor more is known, the step that it was in; and where places are some 
 noise at best, for other numbers of the car at worst, with standard errors that are far too small.
 
 Solution: as in the lab's searches. Given the fitted model, rounded readings are taken for bounds
-(``likelihood.readings``), and the fit is repeated with these. Where a run states a standard error of its places, its
+(``likelihood.signals``), and the fit is repeated with these. Where a run states a standard error of its places, its
 distance error is a spline with that prior (``likelihood.distance_error``). A Gauss-Newton step for this and the free
 numbers together shifts the run, and the fit is repeated there; both, until nothing changes. The resulting covariance of
 the free numbers has the distance errors integrated out (D. J. C. MacKay, Neural Computation 4, 1992).
@@ -17,14 +17,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from logger.arrays import Array
-from logger.fitting.information_matrix import inverse_with_prior
+from logger.fitting.fisher_scoring import inverse_with_prior
 from logger.identification.drive_model import DriveModel
 from logger.identification.prediction_error_fit import Fit, FitOptions
 from logger.identification.session import fit_down_to_0, upright_fit
 from logger.lab.likelihood.distance_error import USUAL, RecordError, RigRecordError, record_error
 from logger.lab.likelihood.lag import offset_by_lag_m
 from logger.lab.likelihood.priors import Tolerance
-from logger.lab.likelihood.readings import Readings
+from logger.lab.likelihood.signals import Readings
 from logger.runs import Run, normalised_rms
 
 ModelOf = Callable[[list[Run]], DriveModel]

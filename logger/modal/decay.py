@@ -33,6 +33,7 @@ import numpy as np
 
 from logger.arrays import Array, Bools, Complex
 from logger.modal.mode import (
+    MOST_DAMPING,
     FoundMode,
     ModalResult,
     OrderPoles,
@@ -44,8 +45,6 @@ from logger.modal.mode import (
 )
 
 Propose = Callable[[Array, float], tuple[OrderPoles, ...]]
-
-_MOST_DAMPING = 0.95
 
 
 @dataclass(frozen=True)
@@ -228,7 +227,7 @@ def _take_in(fit: _Modes, samples: Array, diagram: tuple[OrderPoles, ...], rate_
             break
         larger = _refit(_solve(samples, np.append(fit.poles, proposed[best]), rate_hz), samples, rate_hz)
         ratios = damping_ratio(larger.poles)
-        if fit.cost - larger.cost < threshold or (ratios > _MOST_DAMPING).any():
+        if fit.cost - larger.cost < threshold or (ratios > MOST_DAMPING).any():
             keep = np.arange(len(proposed)) != best
             proposed, waves = proposed[keep], waves.reshape(len(samples), -1, 2)[:, keep].reshape(len(samples), -1)
             continue
@@ -247,7 +246,7 @@ def _bounded(poles: Complex, duration_s: float) -> Bools:
 def _different(poles: Complex, duration_s: float) -> Complex:
     """Poles that could be modes, one of those that are alike within a per cent of damping."""
     alike = 0.005  # relative distance of poles that are tried once only
-    poles = poles[_bounded(poles, duration_s) & (damping_ratio(poles) < _MOST_DAMPING)]
+    poles = poles[_bounded(poles, duration_s) & (damping_ratio(poles) < MOST_DAMPING)]
     cells = np.round(np.log(poles) / alike)
     return np.asarray(poles[np.unique(cells, return_index=True)[1]])
 
@@ -270,7 +269,7 @@ def _fewer(fit: _Modes, samples: Array, diagram: tuple[OrderPoles, ...], rate_hz
 
 def _price(fit: _Modes, threshold: float) -> float:
     """Cost of a fit and its modes; one that nobody would believe is dear."""
-    return fit.cost + threshold * len(fit.poles) + (1e300 if (damping_ratio(fit.poles) > _MOST_DAMPING).any() else 0.0)
+    return fit.cost + threshold * len(fit.poles) + (1e300 if (damping_ratio(fit.poles) > MOST_DAMPING).any() else 0.0)
 
 
 def _gains(fit: _Modes, waves: Array) -> Array:

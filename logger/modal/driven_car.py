@@ -25,7 +25,7 @@ import numpy.typing as npt
 
 from logger.arrays import Array, Bools
 from logger.estimation.road_spectrum import PIVOT_CPM
-from logger.fitting.information_matrix import integrated_out
+from logger.fitting.fisher_scoring import integrated_out
 from logger.fitting.levenberg_marquardt import minimise
 from logger.modal.mode import LARGEST_DAMPING_ERROR, LARGEST_FREQUENCY_ERROR, FoundMode, ModalResult, Rejected
 from logger.roads.iso8608 import HIGHEST_CPM, STANDARD_WAVINESS

@@ -112,7 +112,7 @@ def normalised(shape: Complex) -> Complex:
     return np.asarray(shape / shape[np.abs(shape).argmax()], dtype=np.complex128)
 
 
-_MOST_DAMPING = 0.9
+MOST_DAMPING = 0.9
 LARGEST_FREQUENCY_ERROR = 0.1  # of the frequency
 LARGEST_DAMPING_ERROR = 0.15
 
@@ -175,7 +175,7 @@ def _why_not(pole: complex, frequency_std_hz: float, damping_std: float, moves: 
     reasons = {
         "it is absent from parts of the record": not np.isfinite(frequency_std_hz),
         "it grows instead of decaying": ratio <= 0,
-        "damped so heavily that it hardly oscillates": ratio > _MOST_DAMPING,
+        "damped so heavily that it hardly oscillates": ratio > MOST_DAMPING,
         "no measurable damping: a hum, not a mode": ratio < max(no_damping, min(hum_damping, 2 * damping_std)),
         f"its frequency is uncertain by {frequency_std_hz / hz:.0%}": frequency_std_hz > LARGEST_FREQUENCY_ERROR * hz,
         f"its damping ratio is uncertain by {damping_std:.2f}": damping_std > LARGEST_DAMPING_ERROR,

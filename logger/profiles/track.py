@@ -19,14 +19,12 @@ from typing import ClassVar, Protocol
 import numpy as np
 import numpy.typing as npt
 
-from logger.arrays import Array
+from logger.arrays import ROUNDING, Array
 
 # A patch shorter than this is a point, and the mean over a shorter step that of its two ends: averages over less would
 # drown in rounding, and no profile is so fine.
 POINT_M = 1e-4
 MOST_STEPS = 5_000_000  # what a simulation may hold in memory at once
-# Knots nearer to each other than this share of a spacing are one.
-_SAME_KNOT = 1e-9
 _KEPT_PATHS = 3
 
 
@@ -215,9 +213,9 @@ class TirePath:
             self._pieces = _pieces(heights, slope, np.zeros_like(slope), np.full(len(heights), spacing_m))
             self._cells = len(heights)
             return
-        whole = int(patch_m / spacing_m + _SAME_KNOT)
+        whole = int(patch_m / spacing_m + ROUNDING)
         part = max(patch_m / spacing_m - whole, 0.0)
-        self._second = part if part > _SAME_KNOT else 0.0
+        self._second = part if part > ROUNDING else 0.0
         # Cell 0 lies before the first knot that matters, the last cell after the last one: both are flat.
         self._origin_m = start_m - patch_m / 2 - spacing_m
         self._cells = len(heights) + whole + 3

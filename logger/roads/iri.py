@@ -16,6 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.arrays import Array
+from logger.bounds import EVEN_SAMPLES
 from logger.dsp.filters import BlockFilter
 from logger.dsp.fixed_point import FixedFilter
 from logger.roads.iso8608 import CLASS_GD_N0_CM3, iri_from_gd_n0
@@ -126,7 +127,6 @@ def slope_gain(wave_number_cpm: npt.ArrayLike, tire_base_m: float = TIRE_BASE_M)
 
 
 PER_KM = 1000.0
-_NEARLY = 1e-6
 
 
 def rectified_slope(elevation_m: npt.ArrayLike, spacing_m: float) -> Array:
@@ -245,7 +245,7 @@ def _steps(distance_m: float, spacing_m: float) -> float:
     """Distance in steps; a whole number where rounding alone keeps it from being one."""
     steps = float(distance_m / spacing_m)
     nearest = float(np.rint(steps))
-    return nearest if abs(steps - nearest) < _NEARLY else steps
+    return nearest if abs(steps - nearest) < EVEN_SAMPLES else steps
 
 
 def _mean_between(slope: Array, start: float, stop: float) -> float:

@@ -33,7 +33,8 @@ from logger.geodesy import EARTH_RADIUS_M
 Ints = npt.NDArray[np.intp]
 
 SEARCH_M = 25.0
-"""How far aside a way is looked for: beyond four standard deviations of the difference of two good fixes."""
+"""How far aside a way is looked for: beyond four standard deviations of the difference of two good fixes. No receiver
+with a fix is farther off among houses, but for moments; a parallel street is."""
 MOST_TURN_DEG = 50.0  # Of a window against a way: more is a crossing, or the other direction
 _MOST_CANDIDATES = 64
 _ORIGIN = -1

@@ -35,7 +35,7 @@ from math import log, pi
 import numpy as np
 import numpy.typing as npt
 
-from logger.arrays import Array
+from logger.arrays import ROUNDING, Array
 from logger.units import INCH_PER_MILE_M_PER_KM
 
 Ints = npt.NDArray[np.intp]
@@ -173,9 +173,6 @@ def ride_words(iri_m_per_km: float) -> str:
     return next(words for lowest, words in reversed(RIDES) if iri_m_per_km >= lowest)
 
 
-_ROUNDING = 1e-9  # of a measure, in windows
-
-
 @dataclass(frozen=True, eq=False)
 class SectionWindows:
     """Windows of one way (n,), in order, none over another; NaN: not known, or to stand in no mean.
@@ -262,7 +259,7 @@ def _pieces(windows: SectionWindows, edges_m: Array) -> tuple[Array, npt.NDArray
     section = np.searchsorted(edges_m, middle_m, side="right") - 1
     piece_m = np.diff(cuts)
     inside = (window >= 0) & (middle_m < windows.end_m[window]) & (section >= 0) & (section < len(edges_m) - 1)
-    inside &= piece_m > _ROUNDING * (windows.end_m - windows.start_m)[window]
+    inside &= piece_m > ROUNDING * (windows.end_m - windows.start_m)[window]
     return piece_m[inside], window[inside], section[inside]
 
 

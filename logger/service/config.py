@@ -19,6 +19,7 @@ from drivers.errors import SettingsError
 from drivers.nmea import GPS_BEGAN, ROLLOVERS_MAX
 from drivers.readings import BAUDS, Decimal, OrNone, Whole
 from logger.errors import BadInput
+from logger.question import CAR_MASS, READING_NOISE, WHEELBASE
 from logger.shipped import shipped, vehicle_file, vehicle_path
 from logger.store.export.sticks import MODES, NOT_PAIRED, Pairing
 from logger.store.formats.yaml_nodes import Node, load_mapping
@@ -29,8 +30,6 @@ from logger.vehicle.vehicle import GENERIC
 MACHINE_CONFIG = Path("/etc/ridelog/ridelog.yaml")
 
 AUTO = "auto"
-LEAST_NOISE_MPS2, MOST_NOISE_MPS2 = 1e-4, 100.0
-WHEELBASES_M, MASSES_KG = (1.5, 6.0), (300.0, 10_000.0)  # from the smallest car with two axles to a lorry
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 GRAVITY_TOLERANCE_G = 0.4  # of what the axis that points up feels
 Read = Callable[[Node], Any]
@@ -55,7 +54,7 @@ def _section(kind: type[Section], readers: Mapping[str, Read] | None = None) -> 
 
 def _noise(node: Node) -> float | str:
     """A noise, or ``AUTO``; ``null``, as earlier versions shipped, says nothing."""
-    noise = None if node.is_null() else OrNone(AUTO, Decimal(LEAST_NOISE_MPS2, MOST_NOISE_MPS2)).read(node)
+    noise = None if node.is_null() else OrNone(AUTO, Decimal(*READING_NOISE[:2])).read(node)
     return AUTO if noise is None else float(noise)
 
 
@@ -209,8 +208,8 @@ class Config:
     accelerometer: AccelerometerConfig = field(default_factory=AccelerometerConfig, metadata={"read": _accelerometer})
     gps: GpsConfig = _setting(GpsConfig(), _section(GpsConfig))
     vehicle: Path = field(default_factory=lambda: vehicle_file(GENERIC), metadata={"read": _vehicle})
-    wheelbase_m: float | None = _setting(None, OrNone("null", Decimal(*WHEELBASES_M)).read)
-    mass_kg: float | None = _setting(None, OrNone("null", Decimal(*MASSES_KG)).read)
+    wheelbase_m: float | None = _setting(None, OrNone("null", Decimal(*WHEELBASE[:2])).read)
+    mass_kg: float | None = _setting(None, OrNone("null", Decimal(*CAR_MASS[:2])).read)
     vehicle_error: float = _setting(0.05, Decimal(0, 1).read)
     pipeline: PipelineConfig = _setting(PipelineConfig(), _pipeline)
     log: LogConfig = _setting(LogConfig(), _section(LogConfig))

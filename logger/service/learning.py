@@ -26,7 +26,8 @@ from logger.estimation.receiver_delay import UNKNOWN, CarriedDelay, combined
 from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.files import STATE_BYTES
 from logger.printable import counted
-from logger.service.config import AUTO, LEAST_NOISE_MPS2, MOST_NOISE_MPS2, AccelerometerConfig, GpsConfig
+from logger.question import READING_NOISE
+from logger.service.config import AUTO, AccelerometerConfig, GpsConfig
 from logger.service.signal_chain import Axis
 from logger.store.log.atomic_file import replace_file
 from logger.units import US_PER_S
@@ -111,7 +112,7 @@ class LearnedQuantity(Generic[Known]):
 
 
 NOISE = LearnedQuantity("sensor-noise", "the sensor's noise", ("noise_mps2", "noise_std_mps2", "noise_drives"),
-                       "noise_std_mps2", LEAST_NOISE_MPS2, MOST_NOISE_MPS2, LEAST_STD_SHARE,
+                       "noise_std_mps2", *READING_NOISE[:2], LEAST_STD_SHARE,
                        lambda known: (known.belief.noise_rms_mps2, known.belief.std_mps2, known.drives),
                        lambda noise, std, drives: KnownNoise(NoiseBelief(log(noise), std / noise), drives))
 DELAY = LearnedQuantity(

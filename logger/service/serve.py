@@ -22,7 +22,7 @@ from logger.service import wiring
 from logger.service.config import GRAVITY_TOLERANCE_G, Config
 from logger.service.event_core import EventCore
 from logger.service.learning import NoiseLearning, ReceiverLearning, delay_at_start, noise_at_start, read_delay
-from logger.service.main_loop import Listener, MainLoop, monotonic_us
+from logger.service.main_loop import PROGRESS_EVERY_US, Listener, MainLoop, monotonic_us
 from logger.service.pipeline import Pipeline
 from logger.service.signal_chain import Axis
 from logger.service.status import SensorStatus, ServiceState, ServiceStatus, write_status
@@ -34,7 +34,6 @@ from logger.store.log.atomic_file import FolderLock
 from logger.store.log.disk_quota import QuotaLimits, memory_notice
 from logger.units import STANDARD_GRAVITY_MPS2, US_PER_S
 
-HEALTH_LINE_US = 60 * US_PER_S
 RECENT_US = 15 * US_PER_S
 LOOKS_WITHOUT_GRAVITY = 5
 UNREADABLE_S = 10.0
@@ -81,7 +80,7 @@ class StatusReporter:
             self._failed = True
         self._look_at_gravity()
         self._look_at_stillness(now_us)
-        if now_us - self._logged_us >= HEALTH_LINE_US:
+        if now_us - self._logged_us >= PROGRESS_EVERY_US:
             self._logged_us = now_us
             log.info("%s", self.line())
 
@@ -175,7 +174,7 @@ class StatusReporter:
     def _look_at_stillness(self, now_us: int) -> None:
         """Restart an accelerometer that drives and gives nothing new; not more than once a minute."""
         frozen_s = self._pipeline.stillness.frozen_s
-        if frozen_s and now_us - self._started_anew_us >= HEALTH_LINE_US:
+        if frozen_s and now_us - self._started_anew_us >= PROGRESS_EVERY_US:
             self._started_anew_us = now_us
             log.warning("accelerometer: %s; restarting it", _frozen(frozen_s))
             self._sensors["accelerometer"].restart(_frozen(frozen_s))

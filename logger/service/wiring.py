@@ -20,6 +20,7 @@ from drivers.dump import DumpHeader, open_dump
 from drivers.errors import SettingsError
 from drivers.nmea import NmeaDecoder, midnight_utc_us
 from drivers.readings import BAUDS, GPS, RecordedWords
+from logger.bounds import UNUSUAL_SIGMA
 from logger.comfort.uncertain_ride import NoiseFloor
 from logger.dsp.filters import BlockFilter
 from logger.dsp.fixed_point import FixedFilter
@@ -35,16 +36,8 @@ from logger.estimation.rms_calibration import rms_relation
 from logger.estimation.road_spectrum import COMMON_ROAD
 from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.estimation.streaming import RoadEstimator
-from logger.service.config import (
-    AUTO,
-    AXES,
-    LEAST_NOISE_MPS2,
-    MASSES_KG,
-    MOST_NOISE_MPS2,
-    WHEELBASES_M,
-    AccelerometerConfig,
-    Config,
-)
+from logger.question import CAR_MASS, READING_NOISE, WHEELBASE
+from logger.service.config import AUTO, AXES, AccelerometerConfig, Config
 from logger.service.drive_readings import RangeUse
 from logger.service.learning import DELAY, NOISE, KnownNoise, delay_at_start, is_loggers
 from logger.service.pipeline import Pipeline, PipelineSettings
@@ -209,7 +202,7 @@ def _noise_floor(sensor: Instrument, low_pass_hz: float | None) -> NoiseFloor:
 
 def notices(config: Config, model: CarModel, sensor: Instrument) -> tuple[str, ...]:
     """What the settings allow and somebody should know all the same."""
-    same_wheelbase = 3 * WHEELBASE_ERROR
+    same_wheelbase = UNUSUAL_SIGMA * WHEELBASE_ERROR
     vehicle, found = model.vehicle, []
     if vehicle.sensor.left_m:
         side = "left" if vehicle.sensor.left_m > 0 else "right"
@@ -306,8 +299,8 @@ def config_for_dump(header: DumpHeader, given: Config | None, vehicle: str | Non
         baud = round(RecordedWords(header.gps).number("baud", config.gps.baud, min(BAUDS.numbers), max(BAUDS.numbers)))
         if given is None and vehicle is None:
             vehicle = said.name("vehicle", "", vehicle_names(), "--vehicle FILE.yaml or ")
-            config = replace(config, wheelbase_m=said.number_or_none("wheelbase_m", None, *WHEELBASES_M),
-                             mass_kg=said.number_or_none("mass_kg", None, *MASSES_KG))
+            config = replace(config, wheelbase_m=said.number_or_none("wheelbase_m", None, *WHEELBASE[:2]),
+                             mass_kg=said.number_or_none("mass_kg", None, *CAR_MASS[:2]))
     return replace(config, accelerometer=sensor, gps=replace(config.gps, baud=baud),
                    vehicle=config.vehicle if vehicle is None else vehicle_path(vehicle))
 
@@ -338,7 +331,7 @@ def _noise_setting(said: RecordedWords, by_logger: bool) -> float | str | None:
     noise = said.group("noise")
     if noise.says("noise_std_mps2") or noise.says("noise_mps2", AUTO):
         return AUTO
-    number = noise.number_or_none("noise_mps2", None, LEAST_NOISE_MPS2, MOST_NOISE_MPS2)
+    number = noise.number_or_none("noise_mps2", None, *READING_NOISE[:2])
     return AUTO if number is None and not by_logger else number
 
 

@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from logger.arrays import Array, Complex
+from logger.arrays import ROUNDING, Array, Complex
+from logger.bounds import ACCELERATION
 from logger.vehicle.effect import (
     ActuatorEffect,
     BodyEffect,
@@ -44,11 +45,8 @@ from logger.vehicle.structure import (
 )
 from logger.vehicle.vehicle import Axle, Vehicle
 
-MOST_MPS2 = 1e6
+MOST_MPS2 = ACCELERATION.largest
 """Records end here: those of a car whose motion grows without bound, which effects may make."""
-
-
-_NO_RISE_MPS = 1e-9  # over half a step: less is lost in rounding
 
 
 @dataclass(frozen=True, eq=False)
@@ -276,7 +274,7 @@ def _friction_of_held(laws: CornerLaws, rate_mps: Array, rise_mps2: Array, step_
         size = np.abs(rate)
         return size + transition * np.log1p(np.exp(-2 * size / transition)) if transition > 0 else size
 
-    over = np.abs(way) > _NO_RISE_MPS
+    over = np.abs(way) > ROUNDING
     mean = (integral(rate_mps + way) - integral(rate_mps - way)) / np.where(over, 2 * way, 1.0)
     return np.where(over, laws.dry_friction_n * mean * laws.stribeck.times(rate_mps), laws.friction_n(rate_mps))
 

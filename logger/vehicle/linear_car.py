@@ -31,7 +31,7 @@ from logger.vehicle.structure import Output, Structure, body_point
 from logger.vehicle.vehicle import Vehicle
 
 # Step of differences, as a share: a mode of quality Q bends over a step h by (Q h)^2 / 6, and rounding is 1e-16 / h.
-_STEP = 1e-5
+STEP = 1e-5
 
 
 def dynamic_stiffness(mass: Array, damping: Array, stiffness: Array, s: Complex) -> Complex:
@@ -321,7 +321,7 @@ class AxleResponse:
 
         slopes = []
         for one, value in zip(self.parameters, values, strict=True):
-            step = _STEP * (abs(value) if one.by_factors else one.usual or 1.0)
+            step = STEP * (abs(value) if one.by_factors else one.usual or 1.0)
             low, high = (gains(changed(vehicle, {one.name: value + way * step})) for way in (-1, 1))
             slopes.append((high - low) / (2 * step))
         here = gains(vehicle)

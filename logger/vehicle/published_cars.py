@@ -17,6 +17,7 @@ from functools import cache
 import numpy as np
 
 from logger.arrays import Array
+from logger.vehicle.linear_car import STEP
 from logger.vehicle.named_parameters import read, sized
 from logger.vehicle.uncertain import NumberErrors
 from logger.vehicle.vehicle import AT_CENTRE_OF_GRAVITY, GENERIC, Axle, SensorPlace, Vehicle
@@ -82,7 +83,6 @@ QUARTER_CARS = {
 _HOP_APART = 0.08
 """Logarithm by which a car's wheel hops differ (a judgement: the tables give both axles one tire and often one mass, so
 that they do not say it)."""
-_STEP = 1e-5  # of logarithms, for slopes
 _PATCH_M, _PATCH_SPREAD = 0.22, 0.15
 """Length over which a tire averages the road: contact patch and what the belt bridges, 0.2 to 0.25 m in the files that
 come with ridelog, 0.25 m in ASTM E1926; a judgement."""
@@ -120,7 +120,8 @@ def published_prior() -> CarPrior:
 
 
 WHEELBASE_ERROR = 0.01
-"""Share by which a wheelbase out of a car's papers, or by a tape, is off (a judgement)."""
+"""Share by which a wheelbase out of a car's papers, or by a tape, is off: they give it to a millimetre, and the load
+moves it by a per cent (a judgement)."""
 
 
 def generic_car(wheelbase_m: float | None = None, mass_kg: float | None = None) -> tuple[Vehicle, NumberErrors]:
@@ -152,8 +153,8 @@ def number_errors(vehicle_at: Callable[[Array], Vehicle], at: Array, covariance:
     names = [name for name in sized(vehicle_at(at)) if name != "sprung_mass_kg"]
     if vehicle_at(at).sensor.ahead_m:
         names.append("sensor.ahead_m")
-    ends = ((vehicle_at(at + step), vehicle_at(at - step)) for step in _STEP * np.eye(len(at)))
-    slopes = np.array([[read(high, name) - read(low, name) for name in names] for high, low in ends]).T / (2 * _STEP)
+    ends = ((vehicle_at(at + step), vehicle_at(at - step)) for step in STEP * np.eye(len(at)))
+    slopes = np.array([[read(high, name) - read(low, name) for name in names] for high, low in ends]).T / (2 * STEP)
     return NumberErrors.of_covariance(names, slopes @ covariance @ slopes.T)
 
 

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from logger.arrays import Array, Complex
+from logger.bounds import EVEN_SAMPLES
 from logger.dsp.filters import kaiser_half_length, low_pass_taps
 from logger.dsp.resample import PASS_OF_RATE
 from logger.profiles.track import Way, WheelTracks
@@ -22,7 +23,6 @@ STOP_DB = 80.0
 _HALF_SAMPLES = ceil(kaiser_half_length(STOP_DB, 2 * np.pi * (STOP_OF_RATE - PASS_OF_RATE)))
 # The recorder's gain is read off a transform of so many points of its filter at so many times its rate.
 _GAIN_STEPS, _GAIN_GRID = 4, 16384
-_EVEN = 1e-3
 
 
 def recorder_taps(steps: int) -> Array:
@@ -106,7 +106,7 @@ class Passage:
         self.track, self.rate_hz, self.distance_m = track, rate_hz, distance_m
         self.count = len(distance_m)
         self._of_bench, each = of_bench, max(of_bench, 1)
-        self.steps = each * max(1, int(np.ceil(fine_hz / (rate_hz * each) - _EVEN)))
+        self.steps = each * max(1, int(np.ceil(fine_hz / (rate_hz * each) - EVEN_SAMPLES)))
         self.step_s = 1 / (rate_hz * self.steps)
         self._lead = min(round(APPROACH_S * rate_hz), self.count) if is_free else round(APPROACH_S * rate_hz)
         self._mirrored = self._lead if is_free else 0

@@ -2,7 +2,7 @@
 
 A car with tire damping drives over roads of three classes; its record has noise and is rounded to a BMA220's step, from
 some place within the step on. A number of the car and one of the effect are fitted, once with rounding as noise and
-once with the readings as ``logger.lab.likelihood.readings`` takes them, many times over. Beside the errors that these
+once with the readings as ``logger.lab.likelihood.signals`` takes them, many times over. Beside the errors that these
 fits truly have stands the limit of Cramer and Rao, of readings of which each is known to be between its two bounds:
 per sample, the sum over steps of (difference of the normal densities at the bounds)^2 / probability. The distances are
 exact here, and everything else is known.
@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.stats import norm
 
-from logger.lab.likelihood.readings import Readings
+from logger.lab.likelihood.signals import Readings
 from logger.lab.likelihood.whittle import Bands
 from logger.profiles.track import Track
 from logger.runs import RecordFacts, Run

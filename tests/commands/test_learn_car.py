@@ -162,7 +162,7 @@ def test_one_speed_says_what_to_add(tmp_path: Path) -> None:
 
 def test_what_is_no_drive_is_refused_in_one_line(tmp_path: Path, runs: list[Path]) -> None:
     for words, said in (((tmp_path / "none", "--wheelbase", 2.66), "found no such file"),
-                        ((*runs, "--wheelbase", 266), "--wheelbase 266: expected 1.5 to 5 m"),
+                        ((*runs, "--wheelbase", 266), "--wheelbase 266: expected 1.5 to 6 m"),
                         ((*runs, "--wheelbase", 2.66, "--sensor", "left_m=1"), "expected ahead_m=METRES"),
                         ((runs[0], runs[0], "--wheelbase", 2.66), "expected every drive once"),
                         ((runs[3], "--wheelbase", 2.66), "expected at least two minutes of steady driving")):

@@ -8,8 +8,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from logger.fitting.fisher_scoring import maximise
-from logger.fitting.information_matrix import integrated_out, inverse, whitening
+from logger.fitting.fisher_scoring import integrated_out, inverse, maximise, whitening
 
 Array = npt.NDArray[np.float64]
 COUNTS = np.array([3.0, 11.0, 40.0])

@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
-from logger.fitting.information_matrix import correlation_of
+from logger.fitting.fisher_scoring import correlation_of
 from logger.identification.drive_model import DriveModel
 from logger.identification.identifiability import UNEXPLAINED, NotIdentifiable
 from logger.identification.noise_models import Autoregressive, RoadNoise, White

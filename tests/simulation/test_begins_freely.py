@@ -162,7 +162,7 @@ def test_to_rank_cars_a_driven_record_begins_as_without_their_laws(monkeypatch: 
     """No state is sought by simulations with the law, and the right car is near what was measured."""
     car = compose(ringing(0.3), (CUBIC,))
     later = shaken_before("displacement", car)
-    monkeypatch.setattr("logger.simulation.beginning._bent_beginning", None)
+    monkeypatch.setattr("logger.simulation.virtual_drive._bent_beginning", None)
     (found,) = SimulatedRuns([later]).predict(car, near=())
     assert later.residual(found)[later.first:].std() < 0.05 * later.measured_mps2.std()
 

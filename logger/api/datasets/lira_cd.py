@@ -18,9 +18,10 @@ import numpy as np
 from logger.api import data_sets
 from logger.arrays import Array
 from logger.errors import BadInput, as_bad_input
-from logger.extraction.along_track import ASIDE_M, MeasuredLine
+from logger.extraction.along_track import MeasuredLine
 from logger.files import read_bounded
 from logger.roads.repeated_drives import best_shift_m, matching_cells, mean_between
+from logger.roads.road_matching import SEARCH_M
 from logger.shipped import vehicle_path
 from logger.store.formats.csv_table import columns_of
 from logger.store.formats.record_file import MAX_BYTES
@@ -174,7 +175,7 @@ def _aran(path: Path, line: MeasuredLine) -> tuple[Array, Array]:
     lat_deg, lon_deg, left, right = _columns(path, "Lat", "Lon", "Venstre IRI (m/km)", "Højre IRI (m/km)")
     known = (np.abs(lat_deg) > 1e-6) & np.isfinite(lat_deg + lon_deg)
     at_m, aside_m = line.passed(lat_deg[known], lon_deg[known])
-    on = aside_m <= ASIDE_M
+    on = aside_m <= SEARCH_M
     order = np.argsort(at_m[on], kind="stable")
     at_m, values = at_m[on][order], ((left + right) / 2)[known][on][order]
     grows = np.append(np.diff(at_m) > 1e-3, True)

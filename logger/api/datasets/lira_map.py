@@ -17,9 +17,10 @@ from logger.api.data_sets import REPEAT_COLUMNS, WINDOWS_M, expected_files, repe
 from logger.bounds import DISTANCE, LATITUDE, LONGITUDE, SIGNAL
 from logger.chart_data import Array, Curves, Line
 from logger.errors import BadInput
-from logger.extraction.along_track import ASIDE_M, MeasuredLine
-from logger.files import read_bounded
+from logger.extraction.along_track import MeasuredLine
+from logger.files import MAP_BYTES, read_bounded
 from logger.roads.repeated_drives import best_shift_m, matching_cells, mean_between
+from logger.roads.road_matching import SEARCH_M
 from logger.studies.study import Item, Picture, Result, Table, Word, Workload
 
 PASSES = ("trip_iri_1ccf", "trip_iri_85e7", "trip_iri_e9ef")
@@ -27,7 +28,6 @@ _COLUMNS = ("timestamp", "value", "lat", "lng")
 _QUANTITIES = (DISTANCE, SIGNAL, LATITUDE, LONGITUDE)
 _CELL_M, _MOST_CELLS = 10.0, 1
 _STRETCH_CELLS, _STRETCH_MOST_M = 20, 4.0
-_MOST_BYTES = 64 << 20
 _PIECEWISE = "aligned, each 200 m moved by up to 4 m"
 
 
@@ -35,7 +35,7 @@ class ProfilerPass:
     """Cells (k,) of 10 m with their IRI [m/km], and the places at which they begin."""
 
     def __init__(self, path: Path) -> None:
-        data = read_bounded(path, _MOST_BYTES)
+        data = read_bounded(path, MAP_BYTES)
         try:
             points = json.loads(gzip.decompress(data) if path.suffix == ".gz" else data)["path"]["data"]
             rows = np.array([(float(one["timestamp"]), one["value"], one["pos"]["lat"], one["pos"]["lng"])
@@ -92,7 +92,7 @@ def lira_map(folder: Path, effort: Workload) -> Result:
 def _beside(one: ProfilerPass, other: ProfilerPass, window_m: float) -> list[tuple[str | float | None, ...]]:
     """The other pass on the distance of the one, in three ways, of ever more freedom."""
     at_m, aside_m = one.line.passed(other.lat_deg, other.lon_deg)
-    on = (aside_m <= ASIDE_M) & np.append(True, np.diff(np.maximum.accumulate(at_m)) > 0)
+    on = (aside_m <= SEARCH_M) & np.append(True, np.diff(np.maximum.accumulate(at_m)) > 0)
     at_m, values = at_m[on], other.iri_m_per_km[on]
     begin_m = np.arange(one.edges_m[0], one.edges_m[-1] - window_m + 1, window_m)
     ends_m = (begin_m, begin_m + window_m)

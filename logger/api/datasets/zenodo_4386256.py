@@ -13,6 +13,7 @@ from tempfile import TemporaryDirectory
 import numpy as np
 
 from logger.api import data_sets
+from logger.api.data_sets import FIX_S
 from logger.arrays import Array
 from logger.errors import BadInput
 from logger.geodesy import EARTH_RADIUS_M
@@ -29,7 +30,6 @@ _ROADS = (
 )
 _TRIP = ("t", "x", "y", "z", "speedMS", "LAT", "LON")
 _OFF = "of driving on the profile, found none"  # a trip over another of the roads
-_FIX_S = 1.0  # places come at the phone's 100 Hz, of a receiver that has one a second
 _UNEVEN = 0.01
 
 
@@ -127,7 +127,7 @@ def trip(file: Path) -> data_sets.RoadRecording:
     time_s, x, y, z, speed_mps, lat_deg, lon_deg = columns
     accel = np.column_stack([x, y, z])
     fixed = (np.abs(lat_deg) > 1e-6) & np.isfinite(lat_deg + lon_deg + speed_mps)
-    second = np.floor((time_s - time_s[0]) / _FIX_S)
+    second = np.floor((time_s - time_s[0]) / FIX_S)
     kept = np.flatnonzero(fixed)[np.unique(second[fixed], return_index=True)[1]]
     return data_sets.RoadRecording(file.stem, time_s, accel, data_sets.unit_by_gravity(accel), time_s[kept],
                                    speed_mps[kept], lat_deg[kept],

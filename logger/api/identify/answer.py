@@ -28,13 +28,21 @@ from logger.api.lab.checks import (
 from logger.api.shared_fields import each, paths_of
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, check_forces, model_of
+from logger.bounds import UNUSUAL_SIGMA
 from logger.chart_data import Array, Bars, Chart, Curves, Line
 from logger.dsp.filters import DecimatingLowPass
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput, CheckFailed, as_bad_input
-from logger.fitting.information_matrix import correlation_of
+from logger.fitting.fisher_scoring import correlation_of
 from logger.identification.drive_model import DriveModel
 from logger.identification.identifiability import NotIdentifiable
-from logger.identification.noise_models import UNTESTED, Test, autocorrelation, autocorrelations, cross_correlation
+from logger.identification.noise_models import (
+    LAGS,
+    UNTESTED,
+    Test,
+    autocorrelation,
+    autocorrelations,
+    cross_correlation,
+)
 from logger.identification.prediction_error_fit import Fit, FitOptions, least_share
 from logger.identification.session import LEAST_SAMPLES, drives_of, error_before, fit_options, obstacle_starts
 from logger.identification.shared_road_covariance import CommonRoughness, may_have_common, with_common_roughness
@@ -51,14 +59,13 @@ from logger.identification.unknown_inputs import (
 from logger.identification.unknown_road.marginal_likelihood import GD_N0, NOISE, OFFSET, Options
 from logger.identification.unknown_road.marginal_likelihood import Options as RoadOptions
 from logger.identification.unknown_road.road_fit import RoadFit, fit_roads
-from logger.lab.likelihood.priors import UNUSUAL_SIGMA
 from logger.lab.readings_fit import ReadingsFit, fit_to_readings
 from logger.left_out import left_out_json, left_out_lines
 from logger.profiles.track import Track
 from logger.question import function
-from logger.report.blocks import Blocks, Lines, Table
+from logger.report.blocks import SHOWN_ROWS, Blocks, Lines, Table
+from logger.report.quantities import WIDTH, measured, unit_of
 from logger.report.quantities import known as known_number
-from logger.report.quantities import measured, unit_of
 from logger.roads.iso8608 import STANDARD_WAVINESS
 from logger.runs import Run as Record
 from logger.runs import no_readings, past_of, runs_left_out, zero_is_known
@@ -452,8 +459,6 @@ def _head(given: vehicle_file.CarModel, free: int, records: Sequence[Record], mo
 
 
 NORMAL_95 = 1.959964
-_LINE = 96
-"""Characters of numbers in the first line: it ends within a page of print."""
 _MENTIONED = 0.7
 _DOUBTFUL = 0.1
 
@@ -534,7 +539,7 @@ def _first_lines(fit: Fit | RoadFit, head: str, error: str) -> Iterator[str]:
     then what they are from, how the fit ended and how far it explains the runs."""
     said = [f"{name} {measured(value, fit.standard_errors[name])} {unit_of(name)}".rstrip()
             + " (at its bound)" * (name in fit.at_bound) for name, value in fit.parameters.items()]
-    held = max((count for count in range(1, len(said) + 1) if len(", ".join(said[:count])) <= _LINE), default=1)
+    held = max((count for count in range(1, len(said) + 1) if len(", ".join(said[:count])) <= WIDTH), default=1)
     yield (f"{', '.join(said[:held])}{f', and {len(said) - held} more below' * (held < len(said))}" if fit.converged
            else f"NOT CONVERGED in {fit.iterations} steps: do not use these values; give a nearer vehicle file, or "
                 "free fewer parameters.")
@@ -679,19 +684,16 @@ def unmeasured_lines(fit: RoadFit, free: Sequence[Free]) -> Iterator[str]:
            "bias the estimates. Masses, springs and dampers are known only relative to those that were held fixed.")
 
 
-_LAGS, _MOST_PAIRS = 50, 12
-
-
 def charts(fit: Fit | RoadFit) -> list[Chart]:
     """Of a fit on measured roads the residuals' autocorrelation, with the band that chance stays in; of every fit with
     two numbers or more how they hang together."""
-    bars = Bars("Correlated estimates", "correlation of their errors", tuple(_pairs(fit, ", ")[:_MOST_PAIRS]))
+    bars = Bars("Correlated estimates", "correlation of their errors", tuple(_pairs(fit, ", ")[:SHOWN_ROWS]))
     return [*([_left(fit.white)] if isinstance(fit, Fit) else []), *([bars] if bars.bars else [])]
 
 
 def _left(white: list[Array]) -> Curves:
     """G. M. Ljung and G. E. P. Box 1978: of white residuals each is nearly normal, of variance 1 / n."""
-    found = autocorrelations(white, min(_LAGS, min(map(len, white)) - 1))
+    found = autocorrelations(white, min(LAGS, min(map(len, white)) - 1))
     lags = np.arange(1.0, len(found) + 1)
     bound = np.full(len(lags), NORMAL_95 / np.sqrt(sum(map(len, white))))
     return Curves("Autocorrelation of the residuals", "lag [samples]", "correlation", (

@@ -14,12 +14,13 @@ import numpy as np
 
 from logger.api.vehicles import check_forces
 from logger.arrays import Array, Bools
-from logger.bounds import SPEED, time_hint
+from logger.bounds import QUIETEST_MPS2, SPEED, time_hint
 from logger.dsp.channel_faults import at_ends, goes_against, longest_still
 from logger.dsp.repeated_samples import find_repeats, stretches_of
 from logger.dsp.whole_record import thinned
 from logger.errors import BadInput, as_bad_input
 from logger.estimation.batch import BACK_M
+from logger.identification.noise_models import DOUBT
 from logger.identification.time_scale import at_time_scale
 from logger.lab.another_car import LikeliestRig, another_car, error_with_best_effect, likeliest_rig
 from logger.lab.likelihood.lag import SLOWEST_MPS
@@ -38,7 +39,7 @@ from logger.lab.road_match import (
     road_match,
 )
 from logger.lab.selection.evidence import FALSE_ALARM
-from logger.lab.selection.holdout import ROUNDING
+from logger.lab.selection.holdout import AS_PRINTED
 from logger.left_out import LeftOut
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
@@ -72,7 +73,6 @@ from logger.vehicle.simulate import resampled
 from logger.vehicle.uncertain import UNKNOWN
 from logger.vehicle.vehicle import Vehicle
 
-_MODEL_CHECKS_LEAST_MPS2 = 1e-4
 _NEAR = 0.3
 _RECORD, _PROFILE = "the record seems to be", "the profile seems to be"
 # Measured / model, where one of them is in another unit.
@@ -203,7 +203,7 @@ def _moves(run: Run, prediction: Array) -> bool:
     model = run.main(prediction)[run.first:]
     if run.timed:  # a small rig, or one whose force is in another unit
         return bool(model.any())
-    return float(model @ model) >= _MODEL_CHECKS_LEAST_MPS2**2 * len(model)
+    return float(model @ model) >= QUIETEST_MPS2**2 * len(model)
 
 
 def _other_ways_up(followed: _Followed, rig: LikeliestRig | None) -> Iterator[str]:
@@ -316,7 +316,7 @@ def _another_car(word: str, model: CarModel, runs: SimulatedRuns, predictions: S
     found = another_car(runs.runs, model.vehicle, model.effects, mains, numbers)
     # An effect in the model's car may explain as much as another car does, and both may have come down to the noise.
     if found is not None and error_with_best_effect(found.runs, model.vehicle, model.effects, known, numbers) > (
-            1 + ROUNDING) * found.found_error:
+            1 + AS_PRINTED) * found.found_error:
         from logger.vehicle.stepping_loop import COMPILED  # loads the compiler, if there is one
 
         far = some([f"{name} {share:+.0%}" for name, share in found.shares.items()], more="more parameters far off")
@@ -350,13 +350,11 @@ _SAME_RATE = 1e-3  # times that are written to a millisecond leave the rate of a
 _LEAST_OF_PART_S = 1.0  # a damper's bench makes five turns a second
 _CLIPPED_SHARE = 0.005  # of a record: fewer are a blow or two (a judgement)
 _DIES_DOWN = 0.95  # of the r.m.s.: a damping ratio of 0.3 % does so within six periods (a judgement)
-_BY_CHANCE = 0.01  # that swings which do not shrink seem to (a judgement)
 _LEAST_PERIODS = 3.0  # of what swings: fewer leave its damping to chance (a judgement)
 # The lab looks up to 0.37 of the rate (lab/stretches.py): wheels that hop at 10 to 18 Hz are seen from 50 samples a
 # second on. A recorder's clock may be off by a per cent.
 _LEAST_RATE_HZ, _CLOCK = 50.0, 0.01
 _MOST_MEAN_MPS2 = 2.0
-_RUN_CHECKS_LEAST_MPS2 = 1e-5  # no sensor is so quiet
 _DISAGREE, _DISAGREE_M = 0.5, 5.0
 
 
@@ -530,7 +528,7 @@ def _swings_shrink(samples: Array) -> bool:
     peaks = np.maximum.reduceat(np.abs(around), starts)[:-1] if len(starts) else np.empty(0)
     swings = peaks[:-1] + peaks[1:]
     found, p_value = rank_correlation(np.arange(float(len(swings))), swings, fewest=3)
-    return found < 0 and p_value / 2 < _BY_CHANCE
+    return found < 0 and p_value / 2 < DOUBT
 
 
 _ORDERS = {"displacement": 0, "travel": 0, "velocity": 1, "acceleration": 2}
@@ -706,7 +704,7 @@ def check_readings(drive: Drive, others: Sequence[Drive]) -> None:
         what = "accelerations" if is_acceleration else drive.facts.main.name
         raise BadInput(f"{drive.file}: expected {what} after the first {past_s:g} s, found {found}")
     check_decay(drive)
-    if is_acceleration and counted.std() < _RUN_CHECKS_LEAST_MPS2:
+    if is_acceleration and counted.std() < QUIETEST_MPS2:
         raise BadInput(f"{drive.file}: expected accelerations in m/s2, found none above {np.abs(counted).max():.2g}")
     # Three periods of what rings loudly have a mean of their own, and so has what moves for a short time: at most the
     # range of its speed over that time.

@@ -16,6 +16,7 @@ from logger.api.lab.question import AddEffectQuestion, CompareQuestion, LabQuest
 from logger.api.shared_fields import named_numbers
 from logger.api.shown import CommandResult
 from logger.api.vehicles import Model, model_of
+from logger.bounds import SURE_SIGMA
 from logger.chart_data import Array, Chart, Curves, Line, line
 from logger.errors import BadInput
 from logger.identification.noise_models import rms
@@ -24,7 +25,7 @@ from logger.lab.compare import LabComparison, Standing
 from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.residuals.breakdown import ModelResiduals, Part, frequencies, segments
 from logger.lab.residuals.force_state_map import Curve, ForceMap
-from logger.lab.selection.add_effect import BIAS_SIGMA, AddedEffects, ShiftedNumber
+from logger.lab.selection.add_effect import AddedEffects, ShiftedNumber
 from logger.lab.selection.holdout import JUDGED_ON, fit_percent
 from logger.left_out import left_out_json, left_out_lines
 from logger.printable import counted
@@ -562,7 +563,7 @@ def bias(names: Sequence[str], moved: Sequence[ShiftedNumber]) -> str:
     together = " and ".join(names)
     biased = [one for one in moved if one.biased]
     if not biased:
-        return f"{together} moved no parameter of the model by more than {BIAS_SIGMA:g} standard errors."
+        return f"{together} moved no parameter of the model by more than {SURE_SIGMA:g} standard errors."
     own = [one.name for one in biased]
     listed = some(own) if len(own) > FEW else enumerated(own, "and")
     worst = biased[0]

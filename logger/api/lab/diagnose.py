@@ -21,7 +21,7 @@ from logger.api.shared_fields import each
 from logger.api.vehicles import Model, model_of
 from logger.chart_data import Array, Bars, Curves, Line
 from logger.errors import BadInput
-from logger.extraction.along_track import ASIDE_M, MeasuredLine
+from logger.extraction.along_track import MeasuredLine
 from logger.lab.diagnosis import LabDiagnosis
 from logger.lab.residuals.fitted_laws import RATE, TRAVEL, ForceCurve
 from logger.lab.residuals.unexplained import Shape
@@ -49,6 +49,7 @@ from logger.report.quantities import (
     unit_of,
     wrapped,
 )
+from logger.roads.road_matching import SEARCH_M
 from logger.runs import BY_RECEIVER, UNKNOWN, runs_left_out
 from logger.runs import Run as Record
 from logger.store.formats import drive_file
@@ -224,7 +225,7 @@ def _on_one_distance(drives: Sequence[tuple[drive_file.Drive, str]]) -> list[tup
     found = []
     for drive, name in driven:
         along_m, aside_m = line.passed(*_places(drive))
-        near = (aside_m < ASIDE_M) & (along_m > metres[0]) & (along_m < metres[-1])
+        near = (aside_m < SEARCH_M) & (along_m > metres[0]) & (along_m < metres[-1])
         if np.ptp(drive.distance_m[near]) < _LEAST_SHARED_M if near.any() else True:
             raise BadInput(f"{name}: expected a drive over the road of {along.path}, found that they share less than "
                            f"{_LEAST_SHARED_M:g} m")

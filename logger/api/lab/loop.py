@@ -25,6 +25,7 @@ from logger.estimation.batch import Assessment, figures
 from logger.files import make_folder, write_text
 from logger.lab import compare, diagnosis
 from logger.lab.likelihood.posterior import State
+from logger.lab.likelihood.whittle import HIGHEST_OF_RATE
 from logger.lab.residuals.breakdown import ModelResiduals, frequencies
 from logger.lab.selection.add_effect import AddedEffects, ShiftedNumber, moved_between
 from logger.lab.selection.holdout import JUDGED_ON, ErrorStep
@@ -351,7 +352,6 @@ def as_json(story: Story) -> dict[str, Any]:
 
 STEPS_HINT = ("From step 1 on, the lab refits the model's parameters and the distances within their tolerance. With "
               "the files and distances as they are, the NRMSE is larger.")
-_HIGHEST_OF_RATE = 0.4
 
 
 def story_page(story: Story) -> doc.Html:
@@ -413,7 +413,7 @@ def residual_spectra(story: Story) -> Curves:
     """The residual before and after, by frequency."""
     before, after = story.first.refitted.residuals, story.last.refitted.residuals
     f_hz = frequencies(before)
-    kept = (f_hz > 0) & (f_hz <= _HIGHEST_OF_RATE * before.rate_hz)
+    kept = (f_hz > 0) & (f_hz <= HIGHEST_OF_RATE * before.rate_hz)
 
     def line(name: str, residuals: ModelResiduals, measured: bool) -> Line:
         signals = residuals.measured if measured else residuals.residual

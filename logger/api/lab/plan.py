@@ -27,7 +27,7 @@ from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.profiles.track import Track
 from logger.question import function
 from logger.report import document as doc
-from logger.report.blocks import Block, Blocks, Bullets, Detail, Hint, Section, Table, page
+from logger.report.blocks import SHOWN_ROWS, Block, Blocks, Bullets, Detail, Hint, Section, Table, page
 from logger.report.quantities import some
 from logger.runs import LEAST_S, Past, Run
 from logger.store.formats import drive_file, profile_file, vehicle_file
@@ -132,7 +132,6 @@ def _longest_road(bench: Bench | None) -> Track | None:
     return max(roads, key=lambda one: float(np.subtract(one.end_m, one.start_m)), default=None)
 
 
-_MOST_NEXT = 5
 SENSOR_HINT = ("Assumed noise: a second accelerometer as noisy as the first, a travel sensor 0.5 mm, a gyroscope 0.001 "
                "rad/s.")
 _OBSTACLES = {"bump": "a speed bump {height_m:g} m high and {width_m:g} m long",
@@ -201,7 +200,7 @@ def plan_blocks(found: LabPlan) -> Iterator[Block]:
                                         (0, 3, 4)), Hint(meaning())])
     if found.next:
         yield Section("Drives that would add most", [
-            *(f"{number}. {next_words(one)}" for number, one in enumerate(found.next[:_MOST_NEXT], 1)),
+            *(f"{number}. {next_words(one)}" for number, one in enumerate(found.next[:SHOWN_ROWS], 1)),
             Hint(SENSOR_HINT)])
     else:
         yield "No further drive to propose: the road is too short, or too rough for these speeds."
@@ -249,9 +248,6 @@ def as_json(found: LabPlan) -> dict[str, Any]:
     }
 
 
-_FULL = 100.0  # deviations that are drawn as dark as any
-
-
 def figure(found: LabPlan) -> doc.Html:
     """The matrix: each row an effect that is there; in its own column how far it stands out, in the others what remains
     when that one is fitted in its place. Those that stand out most first."""
@@ -259,19 +255,18 @@ def figure(found: LabPlan) -> doc.Html:
     return heat_map("Standard deviations that remain of a row's effect when the column's effect is fitted in its "
                     "place; framed: its detectability",
                     [found.names[one] for one in order], found.now.pairwise[np.ix_(order, order)],
-                    ISOLABLE_SIGMA, _FULL)
+                    ISOLABLE_SIGMA)
 
 
 _CELL_PX, _HIGH_PX, _LEFT_PX, _TOP_PX, _ROOM_PX = 40, 24, 190, 150, 60
-_FAINTEST, _DARKEST = 0.12, 0.9
-_WHITE_FROM = 0.5
 
 
-def heat_map(title: str, names: Sequence[str], values: Array, least: float, full: float) -> doc.Html:
+def heat_map(title: str, names: Sequence[str], values: Array, least: float) -> doc.Html:
     """The figure element of values (n, n): one row and one column for each name, the diagonal framed.
 
-    What is below ``least`` is red, what is above it blue, and darker up to ``full``.
+    What is below ``least`` is red, what is above it blue, and darker the farther, by its logarithm.
     """
+    full = max(float(values.max(initial=0.0)), 2 * least)
     width, height = _LEFT_PX + _CELL_PX * len(names) + _ROOM_PX, _TOP_PX + _HIGH_PX * len(names) + 8
     heads = doc.concatenated(
         doc.html('<text transform="translate({:.0f} {}) rotate(-55)">{}</text>', _LEFT_PX + _CELL_PX * (column + 0.5),
@@ -286,11 +281,10 @@ def heat_map(title: str, names: Sequence[str], values: Array, least: float, full
 
 def _cell(row: int, column: int, value: float, least: float, full: float) -> doc.Html:
     x, y = _LEFT_PX + _CELL_PX * column, _TOP_PX + _HIGH_PX * row
-    share = min(max(log(max(value, least) / least) / log(full / least), 0.0), 1.0)
-    shade = _FAINTEST + (_DARKEST - _FAINTEST) * share if value >= least else 0.35 * (1 - value / least) + _FAINTEST
+    shade = min(abs(log(max(value, least**2 / full) / least)) / log(full / least), 1.0)
     colour = "--c0" if value >= least else "--c4"
     frame = "stroke:var(--ink);stroke-width:1.5" if row == column else "stroke:none"
-    ink = "#fff" if shade > _WHITE_FROM else "var(--ink)"
+    ink = "#fff" if shade > 0.5 else "var(--ink)"
     return doc.html('<rect x="{}" y="{}" width="{}" height="{}" style="fill:var({});fill-opacity:{:.2f};{}"/>'
                     '<text x="{}" y="{}" text-anchor="middle" style="fill:{};font-size:11px">{}</text>',
                     x + 1, y + 1, _CELL_PX - 2, _HIGH_PX - 2, colour, shade, frame, x + _CELL_PX // 2, y + 16, ink,

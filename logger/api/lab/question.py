@@ -214,7 +214,7 @@ class PlanQuestion(LabQuestion):
         "plan a drive over the whole profile at this speed [m/s]; may repeat", question.SPEED, "MPS", many=list,
         flag="--speed")] = ()
     noise_mps2: Annotated[float | None, question.Option(
-        "r.m.s. of the sensor's noise [m/s2] (default: that of the runs; without runs 0.05)", question.NOISE,
+        "r.m.s. of the sensor's noise [m/s2] (default: that of the runs; without runs 0.05)", question.READING_NOISE,
         "MPS2")] = None
     step_mps2: Annotated[float, question.Option(
         "quantisation step of the planned sensor [m/s2]", question.ADDED, "MPS2")] = 0.0

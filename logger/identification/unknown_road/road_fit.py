@@ -5,9 +5,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from logger.arrays import Array
-from logger.fitting.fisher_scoring import Maximum, maximise
-from logger.fitting.information_matrix import correlation_of, inverse
+from logger.arrays import ROUNDING, Array
+from logger.fitting.fisher_scoring import Maximum, correlation_of, inverse, maximise
 from logger.identification.identifiability import (
     APART,
     NOT_ONE_ROAD,
@@ -153,7 +152,7 @@ class RoadProblem:
                       for index, road in enumerate(self.roads.roads)]
         own = self.names[:p]
         at_bound = [name for name, one, low, high in zip(own, x, self.low, self.high, strict=False)
-                    if min(one - low, high - one) < 1e-6]
+                    if min(one - low, high - one) < ROUNDING]
         errors = np.append(np.abs(self._scale(x)[:p]) * deviations[:p], list(road_errors.values()))
         return RoadFit(dict(zip(own, values.tolist(), strict=True)), dict(zip(own, errors[:p].tolist(), strict=True)),
                        roads, road_errors, correlation_of(relative) * np.outer(errors, errors), self.names, elevations,

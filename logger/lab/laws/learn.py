@@ -22,9 +22,9 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from logger.bounds import SURE_SIGMA
 from logger.lab.diagnosis import LabDiagnosis, assess, exceeds_noise, search_to_the_last
 from logger.lab.laws.draft import LEARNED, Draft, Family, LawContext
-from logger.lab.likelihood.noise_floor import SURE_SIGMA
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.standard_errors import deviations_from_null, standard_errors
 from logger.lab.selection.evidence import INDISTINGUISHABLE, min_gain

@@ -16,8 +16,8 @@ import numpy as np
 
 from logger.arrays import Array
 from logger.lab.laws.draft import LawContext
+from logger.runs import SLOWEST_MPS
 
-_SLOWEST_MPS = 1.0
 _FINER = 8
 """Grid points per resolution of the longest run, so that a peak is met within a sixteenth of a cycle."""
 _LOUD = 12.0
@@ -44,7 +44,7 @@ def spatial_frequency(context: LawContext, per_m: tuple[float, float], speed_pow
     signals, ways = [], []
     for run, residual, error_m in zip(context.runs, white_residuals(context),
                                       context.posterior.distance_error_m(context.state.record), strict=True):
-        speed = np.maximum(run.speed_mps[run.first:], _SLOWEST_MPS)
+        speed = np.maximum(run.speed_mps[run.first:], SLOWEST_MPS)
         signals.append(residual * (speed / speed.mean()) ** speed_power)
         ways.append((run.distance_m + error_m)[run.first:])
     longest_m = max(float(np.ptp(one)) for one in ways)

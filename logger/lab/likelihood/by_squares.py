@@ -15,8 +15,8 @@ from logger.arrays import Array
 from logger.lab.likelihood.distance_error import ErrorSize
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import CONVERGED, optimise_numbers, record_by_lag
+from logger.lab.likelihood.noise_floor import repeat_each_other
 from logger.lab.likelihood.posterior import NotSimulated, Posterior, State
-from logger.lab.likelihood.repeats import repeat_each_other
 from logger.lab.likelihood.signals import JointWhitener
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.effect import Chosen

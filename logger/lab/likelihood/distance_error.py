@@ -22,7 +22,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from logger.arrays import Array
-from logger.lab.likelihood.priors import CONFLICT_SIGMA, UNUSUAL_SIGMA, Tolerance
+from logger.bounds import CONFLICT_SIGMA, UNUSUAL_SIGMA
+from logger.lab.likelihood.priors import Tolerance
 from logger.runs import RECEIVER_ERROR_LASTS_S, SENSOR, SLOWEST_MPS, Run
 
 if TYPE_CHECKING:

@@ -14,11 +14,11 @@ from functools import partial
 import numpy as np
 
 from logger.arrays import Array
+from logger.bounds import CONFLICT_SIGMA
 from logger.fitting.levenberg_marquardt import Damping, minimise
 from logger.lab.likelihood.lag import RESOLVED_M, offset_by_correlation_m, offset_by_lag_m
 from logger.lab.likelihood.linear_model import LinearModel, RecordErrorFit, whitened
 from logger.lab.likelihood.posterior import NotSimulated, Posterior, State, derivatives
-from logger.lab.likelihood.priors import CONFLICT_SIGMA
 from logger.lab.likelihood.signals import JointWhitener
 from logger.profiles.track import Track
 from logger.vehicle.effect import Chosen, Parameter

@@ -12,13 +12,11 @@ import numpy as np
 from logger.arrays import Array
 from logger.lab.likelihood.distance_error import USUAL, ErrorSize, record_error
 from logger.lab.likelihood.priors import Tolerance, VehiclePrior
-from logger.lab.likelihood.readings import Readings
-from logger.lab.likelihood.signals import bands_of, deviance
+from logger.lab.likelihood.signals import Readings, bands_of, deviance
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import WheelTracks
 from logger.runs import normalised_rms_error
-from logger.simulation.beginning import Beginning
-from logger.simulation.virtual_drive import SimulatedRuns
+from logger.simulation.virtual_drive import Beginning, SimulatedRuns
 from logger.vehicle.compose import Car, compose
 from logger.vehicle.effect import Chosen
 from logger.vehicle.vehicle import Vehicle

@@ -12,17 +12,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from logger.arrays import Array, Bools
+from logger.bounds import CONFLICT_SIGMA, UNUSUAL_SIGMA
 from logger.runs import ENCODER, SENSOR, Signal
 from logger.vehicle.named_parameters import PRELOAD, WEAKEST, changed, read, sized
 from logger.vehicle.uncertain import Known, grows_with_mass
 from logger.vehicle.vehicle import Vehicle
-
-UNUSUAL_SIGMA = 3.0
-"""More standard deviations of its prior are unusual of a nuisance parameter: of a dozen right numbers one goes as far
-in thirty comparisons (normal distribution)."""
-CONFLICT_SIGMA = 4.0
-"""A nuisance parameter so many standard deviations off is in conflict with its prior: of a dozen right numbers one goes
-as far in 1300 comparisons (normal distribution)."""
 
 
 @dataclass(frozen=True)

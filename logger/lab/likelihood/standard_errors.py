@@ -21,7 +21,7 @@ from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import own_slopes, range_of, with_dimensions
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.runs import are_on_rig
-from logger.simulation.beginning import begins_unknown
+from logger.simulation.virtual_drive import begins_unknown
 from logger.vehicle.effect import Chosen, Sought
 from logger.vehicle.named_parameters import FreeParameter, coordinates_of, free_parameters_of, read, slope_of
 from logger.vehicle.uncertain import NumberErrors, dimensions_of

@@ -20,16 +20,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from logger.arrays import Array, Complex
+from logger.bounds import DISCREPANCY, EVEN_SAMPLES, QUIETEST_MPS2
 from logger.dsp.whole_record import HALF_WIDTH_HZ
-from logger.runs import EVEN_SAMPLES, READING, Run, Signal
+from logger.runs import READING, Run, Signal
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
 
-DISCREPANCY = 0.003
-"""Share of the signal in a band by which two right simulations of one car may differ. They differ most where a car has
-dry friction, whose force is delayed by part of a step. A judgement: with 1 %, searches called right models unexplained.
-"""
 UNEXPLAINED = 0.10
 """A residual above the noise by this share of it, or more, is unexplained. A judgement: a fifth of the noise's
 power."""
@@ -40,9 +37,9 @@ HIGHEST_OF_RATE = 0.37
 ``resample.PASS_OF_RATE``, up to which a usual filter is flat."""
 LOWEST_HZ = 0.4
 """Accelerations are not compared below: a car hardly accelerates there, and sensors drift."""
-# Least noise: of the sensor's acceleration, and of another signal as a share of its own deviation. No sensor has less
-# than a ten-millionth of g; simulated records without noise need a level above 0.
-_LEAST_MPS2, _LEAST_SHARE = 1e-6, 1e-6
+# Least noise of another signal than the sensor's acceleration, as a share of its own deviation: simulated records
+# without noise need a level above 0.
+_LEAST_SHARE = 1e-6
 # Edges of the bands at 100 samples a second [Hz]: from half of the frequency wide at the bottom to a tenth at the top,
 # as resonances with a damping ratio of 0.3 (the body) and 0.1 (the wheels) are.
 _EDGES_HZ = (LOWEST_HZ, 1.0, 1.6, 2.4, 3.4, 4.6, 6.0, 7.5, 9.0, 10.5, 12.0, 13.5, 15.0, 17.0, 19.0, 21.0, 23.0, 25.0,
@@ -92,7 +89,7 @@ class Bands:
         self._share = 1.0 if run.usable is None else max(float(np.mean(run.usable[run.first:] == READING)), 1 / kept)
         self.freedom = 2 * np.array([len(one) for one in self._members]) / size * kept * self._share
         measured = (run.measured_mps2 if signal is None else run.more[signal]) * run.read
-        least = _LEAST_MPS2**2 if signal is None else _LEAST_SHARE**2 * float(measured.var())
+        least = QUIETEST_MPS2**2 if signal is None else _LEAST_SHARE**2 * float(measured.var())
         self.floor = np.maximum(DISCREPANCY**2 * self.power(measured), least)
         self.one_level = run.timed
 

@@ -1,4 +1,4 @@
-"""Tests of a model's residual, one file for each kind: the file is the whole registration (``drivers.catalogue``).
+"""Tests of a model's residual: a file in this folder is the whole registration (``drivers.catalogue``).
 
 What a file has to offer stands in ``tests.py``. None of them knows an effect.
 """

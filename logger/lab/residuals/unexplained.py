@@ -39,10 +39,10 @@ from functools import cached_property
 import numpy as np
 
 from logger.arrays import Array
+from logger.bounds import SURE_SIGMA, UNUSUAL_SIGMA
 from logger.lab.likelihood.distance_error import unusual_distance_error_m
-from logger.lab.likelihood.noise_floor import SURE_SIGMA, NoiseLevel, growing_power, sensor_noise_of
+from logger.lab.likelihood.noise_floor import NoiseLevel, growing_power, sensor_noise_of
 from logger.lab.likelihood.posterior import Posterior, State
-from logger.lab.likelihood.priors import UNUSUAL_SIGMA
 from logger.lab.likelihood.signals import JointBands
 from logger.lab.likelihood.whittle import LOWEST_HZ, UNEXPLAINED
 from logger.lab.residual_tests import run_residual_tests

@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
+from logger.bounds import SURE_SIGMA
 from logger.lab.likelihood.by_squares import BySquares
 from logger.lab.likelihood.distance_error import zero_of
 from logger.lab.likelihood.linear_model import LinearModel
@@ -39,9 +40,6 @@ from logger.vehicle.named_parameters import read
 from logger.vehicle.uncertain import NumberErrors
 from logger.vehicle.vehicle import Vehicle
 
-BIAS_SIGMA = 2.0
-"""A number that an effect moves by more standard errors than this had been biased by its absence."""
-
 
 @dataclass(frozen=True)
 class ShiftedNumber:
@@ -63,7 +61,7 @@ class ShiftedNumber:
     @property
     def biased(self) -> bool:
         """Whether the absence of the effects had biased it."""
-        return abs(self.shift) > BIAS_SIGMA
+        return abs(self.shift) > SURE_SIGMA
 
 
 @dataclass(frozen=True, eq=False)

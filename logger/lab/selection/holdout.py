@@ -21,15 +21,14 @@ import numpy.typing as npt
 from logger.arrays import Array
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import MapFit, own_slopes
-from logger.lab.likelihood.readings import error_with_rounding_noise
-from logger.lab.likelihood.signals import deviance
+from logger.lab.likelihood.signals import deviance, error_with_rounding_noise
 from logger.runs import Run
 
 JUDGED_ON = "held-out stretches"
 """What the errors of steps and candidates are errors of."""
 AS_FILED, REFITTED = "the vehicle's file unchanged", "its parameters refitted"
 # A relative difference below it is a rounding: errors are printed to two digits or three.
-ROUNDING = 0.005
+AS_PRINTED = 0.005
 _STRETCH_S, _FOLDS = 6.0, 3
 """Stretches are longer than a car remembers its road, some seconds, and each run of 20 s or more has one of every
 set."""
@@ -52,7 +51,7 @@ class HoldOut:
 
     def is_worse_than(self, without: HoldOut) -> bool:
         """Whether the error is larger than that of a smaller model by more than a rounding."""
-        return self.error > (1 + ROUNDING) * without.error
+        return self.error > (1 + AS_PRINTED) * without.error
 
 
 def most_of(power: float) -> float:
@@ -125,4 +124,4 @@ class ErrorStep(NamedTuple):
 def rising(steps: Sequence[ErrorStep]) -> list[str]:
     """What was done in those steps that raise the error by more than a rounding."""
     return [now.words for before, now in pairwise(steps)
-            if now.error > (1 + ROUNDING) * before.error]
+            if now.error > (1 + AS_PRINTED) * before.error]

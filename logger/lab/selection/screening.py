@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from logger.arrays import Array
-from logger.fitting.information_matrix import inverse
+from logger.fitting.fisher_scoring import inverse
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, effect_slopes
 from logger.lab.likelihood.noise_floor import excess_over_noise, gain_of_full_explanation

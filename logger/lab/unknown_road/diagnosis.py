@@ -14,7 +14,7 @@ from functools import cached_property, partial
 import numpy as np
 
 from logger.dsp.resample import PASS_OF_RATE
-from logger.fitting.information_matrix import integrated_out, inverse
+from logger.fitting.fisher_scoring import integrated_out, inverse
 from logger.identification.identifiability import NOT_ONE_ROAD, Finding, structural
 from logger.lab.diagnosis import CandidateEffect, candidates_of
 from logger.lab.likelihood.noise_floor import NoiseLevel

@@ -43,10 +43,10 @@ from itertools import pairwise, permutations
 import numpy as np
 
 from logger.arrays import Array, Complex
+from logger.bounds import DISCREPANCY
 from logger.dsp.resample import PASS_OF_RATE
 from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM
-from logger.fitting.fisher_scoring import maximise
-from logger.fitting.information_matrix import inverse
+from logger.fitting.fisher_scoring import inverse, maximise
 from logger.identification.unknown_road.marginal_likelihood import (
     OFFSET,
     SHORTEST_CPM,
@@ -63,7 +63,7 @@ from logger.lab.likelihood.lag import lags
 from logger.lab.likelihood.map_fit import ends_of
 from logger.lab.likelihood.noise_floor import NoiseLevel, sensor_noise
 from logger.lab.likelihood.priors import Tolerance, VehiclePrior
-from logger.lab.likelihood.whittle import DISCREPANCY, Bands
+from logger.lab.likelihood.whittle import Bands
 from logger.lab.selection.screening import scale_strength
 from logger.roads.iso8608 import STANDARD_WAVINESS
 from logger.runs import Run, normalised_rms

@@ -31,7 +31,7 @@ from logger.errors import BadInput
 Names = tuple[str, ...]
 
 LINE_BYTES = 64 * 1024
-_HEAD_LINES, _HEAD_BYTES = 200, 1024 * 1024
+_HEAD_LINES, HEAD_BYTES = 200, 1024 * 1024
 """A header is looked for in so much of a file: the longest block of words above one is a page or two."""
 _DELIMITERS = ("\t", ";", ",", "|")
 _BLANKS = " "
@@ -177,7 +177,7 @@ def _first(data: bytes, file: str, head: Sequence[tuple[int, int, str]], said: s
 def _head(data: bytes) -> Iterator[tuple[int, int, str]]:
     """The first lines that are not blank: the number, where the next one begins, the text."""
     start = number = 0
-    while start < min(len(data), _HEAD_BYTES) and number < _HEAD_LINES:
+    while start < min(len(data), HEAD_BYTES) and number < _HEAD_LINES:
         end = data.find(b"\n", start)
         end = len(data) if end < 0 else end
         number += 1
@@ -341,7 +341,7 @@ def _is_even(body: bytes, delimiter: bytes, rows: int, many: int) -> bool:
         return False
     start = 0
     while start < len(body):
-        end = body.find(b"\n", start + _HEAD_BYTES) + 1 or len(body)
+        end = body.find(b"\n", start + HEAD_BYTES) + 1 or len(body)
         block = np.frombuffer(body[start:end], dtype=np.uint8)
         ends = np.append(np.flatnonzero(block == ord("\n")), len(block))
         there = np.searchsorted(np.flatnonzero(block == ord(delimiter)), ends)

@@ -44,12 +44,11 @@ from logger.errors import BadInput
 from logger.files import file_in, read_bounded
 from logger.profiles.excitation import AppliedForce, Excitation
 from logger.roads.iri import UNITS_M, unit_complaint
-from logger.store.formats.csv_table import LINE_BYTES, parse_columns, place, refuse_long_lines, shown, taken
+from logger.store.formats.csv_table import HEAD_BYTES, LINE_BYTES, parse_columns, place, refuse_long_lines, shown, taken
 from logger.store.formats.record_file import MAX_BYTES, TIME, even_rate_hz, laid_evenly
 from logger.units import FOOT_M
 
 MAX_CHANNELS = 1000
-MAX_HEADER_BYTES = 1024 * 1024
 MAX_NUMBERS = 50_000_000
 SHORTEST_STEP, LONGEST_STEP = 1e-6, 1e6
 
@@ -165,7 +164,7 @@ class _Header:
             self.lines += 1
             if text.upper() == "END":
                 return
-            if end < 0 or self.size > MAX_HEADER_BYTES:
+            if end < 0 or self.size > HEAD_BYTES:
                 raise BadInput(f"{file}:{self.lines}: expected a line END after the header")
             if self.lines == 2:
                 self._second = text

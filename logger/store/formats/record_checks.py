@@ -20,6 +20,7 @@ from drivers.readings import STANDARD_GRAVITY_MPS2
 from logger.arrays import Array, Bools
 from logger.bounds import LONGEST_HOLE_S, MOVING_MPS, SIGNAL
 from logger.dsp import repeated_samples
+from logger.dsp.resample import GRID_RATE_HZ
 from logger.errors import BadInput
 from logger.files import file_in, read_bounded
 from logger.left_out import LeftOut, counting
@@ -31,7 +32,6 @@ from logger.store.formats.record_file import HOLE_STEPS, MAX_BYTES, TIME, VERTIC
 
 UNITS = ("mps2", "g")
 OWN_RATE = 0.0
-LEAST_RATE_HZ = 100.0
 MOST_RATE_HZ = 10_000.0
 _HOLES = 0.02  # of the time
 
@@ -39,7 +39,7 @@ _HOLES = 0.02  # of the time
 @dataclass(frozen=True)
 class RecordRules:
     """What is said of a record. ``unit``: one of ``UNITS``, None: to be judged; ``resample_hz``: lay it on an even grid
-    of this rate, ``OWN_RATE``: of its own (``LEAST_RATE_HZ`` at least); None: it has to be even, without repeats."""
+    of this rate, ``OWN_RATE``: of its own (``GRID_RATE_HZ`` at least); None: it has to be even, without repeats."""
 
     unit: str | None = None
     resample_hz: float | None = None
@@ -48,8 +48,8 @@ class RecordRules:
         if self.unit is not None and self.unit not in UNITS:
             raise BadInput(f"unit: expected one of {', '.join(UNITS)}, found {self.unit!r}")
         if self.resample_hz is not None and self.resample_hz != OWN_RATE and not (
-                LEAST_RATE_HZ * 0.8 <= self.resample_hz <= MOST_RATE_HZ):
-            raise BadInput(f"resample: expected {LEAST_RATE_HZ * 0.8:g} to {MOST_RATE_HZ:g} Hz, found "
+                GRID_RATE_HZ * 0.8 <= self.resample_hz <= MOST_RATE_HZ):
+            raise BadInput(f"resample: expected {GRID_RATE_HZ * 0.8:g} to {MOST_RATE_HZ:g} Hz, found "
                            f"{self.resample_hz:g}")
 
 
@@ -212,7 +212,7 @@ def _resampled(t_s: Array, samples: Array, names: Mapping[str, Array], others: M
     if holes > _HOLES:
         doubts = [*doubts, Doubt("holes", f"{holes:.1%} of the time is gaps, bridged by interpolation: the true "
                                  "values are higher", {"share": float(holes)})]
-    wanted_hz = rate_hz if rate_hz != OWN_RATE else max(LEAST_RATE_HZ, own_hz)
+    wanted_hz = rate_hz if rate_hz != OWN_RATE else max(GRID_RATE_HZ, own_hz)
     laid = on_even_grid(taken_s, taken, own_hz, wanted_hz)
     grid_s = taken_s[0] + np.arange(len(laid)) / wanted_hz
     beside = {name: np.interp(grid_s, times_s, one) for name, one in others.items()}

@@ -12,10 +12,11 @@ import numpy as np
 
 from logger import bounds
 from logger.arrays import Array
+from logger.bounds import EVEN_SAMPLES
 from logger.dsp.whole_record import mean_rate_hz, on_even_grid
 from logger.errors import BadInput
 from logger.files import file_in, read_bounded
-from logger.runs import EVEN_SAMPLES, NO_READING
+from logger.runs import NO_READING
 from logger.store.formats.csv_table import parse_columns, place, taken
 
 DRIVE_NAME = "drive.csv"

@@ -11,9 +11,10 @@ import pytest
 from scipy.integrate import quad
 from scipy.stats import norm
 
+from logger.comfort.uncertain_ride import BLURRED_FROM_STEPS
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.noise_floor import sensor_noise_of, sensor_noise_with_rounding
-from logger.lab.likelihood.readings import BLURRED, Readings
+from logger.lab.likelihood.signals import Readings
 from logger.lab.likelihood.whittle import Bands
 from logger.runs import CLIPPED, NO_READING, READING, RecordFacts, Run
 
@@ -81,7 +82,7 @@ def test_a_model_that_is_far_off_leaves_what_was_read() -> None:
 
 
 @pytest.mark.parametrize(("facts", "noise"), [
-    (RecordFacts(), 0.05), (RecordFacts(step_mps2=STEP), 1.2 * BLURRED * STEP),
+    (RecordFacts(), 0.05), (RecordFacts(step_mps2=STEP), 1.2 * BLURRED_FROM_STEPS * STEP),
     (RecordFacts(step_mps2=STEP, noise_mps2=STEP), 0.05),
 ], ids=["no step is known", "noise blurs the steps", "the sensor is known to be noisy"])
 def test_what_has_no_bounds_worth_it_stays_as_it_was_read(facts: RecordFacts, noise: float) -> None:

@@ -8,10 +8,9 @@ import pytest
 
 from logger.api.lab.compare import comparison_json, headline
 from logger.lab.compare import compare
-from logger.lab.likelihood.noise_floor import sensor_noise_of
+from logger.lab.likelihood.noise_floor import find_repeats, sensor_noise_of
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
-from logger.lab.likelihood.repeats import find_repeats
 from logger.profiles.excitation import AppliedForce, Excitation
 from logger.runs import Run
 from logger.simulation.virtual_drive import SimulatedRuns

@@ -11,8 +11,7 @@ from logger.lab.likelihood.distance_error import derivative, signals_off
 from logger.lab.likelihood.map_fit import fit_model
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
-from logger.lab.likelihood.readings import Readings
-from logger.lab.likelihood.signals import JointBands, by_signal
+from logger.lab.likelihood.signals import JointBands, Readings, by_signal
 from logger.lab.likelihood.whittle import Bands
 from logger.runs import RecordFacts, Run, Signal, signal_errors
 from logger.simulation.virtual_drive import SimulatedRuns

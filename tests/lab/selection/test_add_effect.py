@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from logger.api.lab.bench import tolerance_of
+from logger.bounds import SURE_SIGMA
 from logger.lab.likelihood.map_fit import align, fit, fit_to_the_end
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.standard_errors import standard_errors
-from logger.lab.selection.add_effect import BIAS_SIGMA, AddedEffects, ShiftedNumber, add, moved_between
+from logger.lab.selection.add_effect import AddedEffects, ShiftedNumber, add, moved_between
 from logger.lab.selection.candidate_fit import chance_of
 from logger.lab.selection.evidence import FALSE_ALARM
 from logger.runs import normalised_rms_error
@@ -125,7 +126,7 @@ def test_distances_are_reported_only_where_they_are_off_by_more_than_usual(runs:
 def test_a_shift_counts_standard_errors() -> None:
     number = ShiftedNumber("sprung_mass_kg", 875.0, 900.0, 9.0, 880.0, 8.0)
     assert number.shift == -2.5 and number.biased
-    assert not replace(number, without=880.0 + 8.0 * BIAS_SIGMA).biased
+    assert not replace(number, without=880.0 + 8.0 * SURE_SIGMA).biased
     assert replace(number, standard_error=0.0).shift == 0
 
 
