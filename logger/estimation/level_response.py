@@ -8,14 +8,16 @@ curvature run in circles, and standard errors by it are wrong as much.
 
 Solution. Beside every other block it is solved once more with the level raised by ``RISE``, from the bounds of the
 block as far as they moved in the blocks before. The difference of both slopes is the curvature; by the difference of
-both solutions bounds and road go along with a level that changes, so that they need not be found anew.
+both solutions bounds and road go along with a level that changes, so that they need not be found anew. And what both
+say of the sensor's noise differs: where readings toggle, more noise and a smoother road look alike, so the evidence for
+a noise is asked at the level that is most probable with it (profile likelihood), not at one level for all.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
 
-from logger.arrays import Array, Complex
+from logger.arrays import Array, Bools, Complex
 from logger.estimation.quantisation import GaussianReadings
 from logger.estimation.road_solver import Block
 from logger.estimation.roughness import resolved_shares
@@ -25,15 +27,20 @@ RISE = 0.4  # of the log level, by 22 % of an IRI: about a standard error of it 
 _FOLLOWED_SAMPLES = 600  # the newest, whose bounds have gone through fewer than four blocks
 RAISED_EVERY = 2  # blocks: how bounds answer a level changes slowly, and a block is a round dearer for it
 _LEAST_CURVATURE = 0.15  # of the expected one: a third of it where readings toggle about one edge
+_MOST_RISE = 1.0  # of a level that goes with another noise: farther off, one step of RISE tells nothing
 _MOST_CHANGE = 0.5  # of a precision at once, so that one is left
 
 
 @dataclass(frozen=True)
 class Answer:
-    """What a level led to: ``readings`` after it, ``waves`` of the road's innovations, and of the points of the block
-    what ``RoadLevels.learn`` was told."""
+    """What a level led to: ``readings`` after it, which of them were read while the car moved, and ``expected`` and
+    ``others`` of ``without_own`` before; ``waves`` of the road's innovations, and of the points of the block what
+    ``RoadLevels.learn`` was told."""
 
     readings: GaussianReadings
+    moving: Bools
+    expected: Array
+    others: Array
     waves: Complex
     innovations: Array
     log_variance: Array
@@ -60,6 +67,7 @@ class LevelResponse:
         self._road: tuple[Block, Complex] | None = None
         self._curvatures = np.zeros(2)
         self.curvature = 1.0
+        self._noise_slope, self._per_reading = np.zeros(1), 0.0
 
     def move_on(self, readings: int) -> None:
         """The next block is without so many of the oldest."""
@@ -85,8 +93,9 @@ class LevelResponse:
         change = np.fft.irfft(block.carried_over(*self._road), block.count)
         return waves + np.fft.rfft(rise / RISE * change)
 
-    def learn(self, block: Block, answer: Answer, raised: Answer) -> None:
-        """From a block's answer, and that to a level raised by ``RISE``."""
+    def learn(self, block: Block, answer: Answer, raised: Answer, noise_slope: Array | None) -> None:
+        """From a block's answer, and that to a level raised by ``RISE``; ``noise_slope`` (g,) is by how much that makes
+        a reading's log evidence for noises rise, per log level."""
         one, other = answer.readings, raised.readings
         self._precision = 1 / other.variance - 1 / one.variance
         self._pull = other.value_mps2 / other.variance - one.value_mps2 / one.variance
@@ -98,3 +107,18 @@ class LevelResponse:
         self._curvatures = (1 - share) * self._curvatures + share * fresh
         if self._curvatures[1] > 0:
             self.curvature = max(float(self._curvatures[0] / self._curvatures[1]), _LEAST_CURVATURE)
+        if noise_slope is not None:
+            share = share if self._per_reading else 1.0
+            followed = answer.moving[:-_FOLLOWED_SAMPLES * len(answer.moving) // len(block.moving)]
+            per_reading = self.curvature * expected / max(int(np.count_nonzero(followed)), 1)
+            self._noise_slope = (1 - share) * self._noise_slope + share * noise_slope
+            self._per_reading += share * (per_reading - self._per_reading)
+
+    def with_level(self, log_evidence: Array, readings: int, number: int) -> Array:
+        """Log evidence (g,) of so many readings for noises, each with the level that goes with it, where it was that
+        with the level that goes with the noise of this ``number``."""
+        if not self._per_reading:
+            return log_evidence
+        slope = self._noise_slope - self._noise_slope[number]
+        rise = np.clip(slope / self._per_reading, -_MOST_RISE, _MOST_RISE)
+        return log_evidence + readings * rise * (slope - 0.5 * self._per_reading * rise)

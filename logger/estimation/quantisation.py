@@ -108,17 +108,15 @@ def without_own(readings: GaussianReadings, fitted_mps2: Array, fitted_variance:
     return (fitted_mps2 / fitted_variance - readings.value_mps2 * taken_out) / others, 1 / others
 
 
-def improved(readings: GaussianReadings, low: Array, high: Array, fitted_mps2: Array, fitted_variance: Array | float,
+def improved(readings: GaussianReadings, low: Array, high: Array, expected: Array, others: Array,
              noise_variance: float) -> GaussianReadings:
     """One round.
 
-    low, high          (t,) bounds of each reading [m/s2]
-    fitted_mps2        (t,) what the solution with ``readings`` says of each acceleration
-    fitted_variance    of that, (t,) or one for all [(m/s2)2]
-    noise_variance     of a reading before it is rounded [(m/s2)2]
+    low, high           (t,) bounds of each reading [m/s2]
+    expected, others    (t,) of each acceleration by all other readings, as ``without_own``
+    noise_variance      of a reading before it is rounded [(m/s2)2]
     """
     own = 1 / readings.variance
-    expected, others = without_own(readings, fitted_mps2, fitted_variance)
     spread = others + noise_variance
     mean, variance = within(expected, spread, low, high)
     precision = np.maximum(1 / variance - 1 / spread, 1e-9 / spread)

@@ -55,6 +55,7 @@ _MORE_ROUNDS, _LEVEL_RESTS, _BOUNDS_REST = 10, 0.06, 0.03
 _LEAST_SHOWN = 1e-3
 _SMOOTHEST_SOLVED = -6.0  # an IRI of 0.12: a bump on a smoother road takes more steps of the solver
 _SETTLED_SAMPLES = 1000  # behind those that show the noise: their bounds have gone through ten rounds by then
+_COMPARED_SAMPLES = 200  # of a block, at two levels of its road
 _MOST_STEPS_PARKED = 8  # more is no stand: somebody works at the car, or the sensor is loose
 # Solved with no less where the noise is learned: what readings say of a smaller one misleads. For 0.15 m/s2 at 8 g R2
 # is 0.20 with none, 0.72 with this, 0.70 with 0.07; for 0.05 m/s2 at 4 g 0.73 with this, 0.62 with 0.07. Others agree.
@@ -185,11 +186,11 @@ class FollowedRoad:
         if self._gaussian is None:
             return
         # What readings say of accelerations of which no other tells yet: they go on as they were.
-        low, high = bounds(fresh.reading_mps2.ravel(), fresh.at_end.ravel(), self.sensor.step_mps2)
+        low, high = self._bounds(fresh)
         count = len(low)
         centre = np.full(count, self._centre_mps2)
         nothing = GaussianReadings(centre, np.full(count, np.inf))
-        guess = improved(nothing, low, high, centre, self._accel_variance, self._noise_variance)
+        guess = improved(nothing, low, high, centre, np.full(count, self._accel_variance), self._noise_variance)
         self._response.move_on(count)
         self._gaussian = GaussianReadings(np.concatenate([self._gaussian.value_mps2[count:], guess.value_mps2]),
                                           np.concatenate([self._gaussian.variance[count:], guess.variance]))
@@ -244,7 +245,8 @@ class FollowedRoad:
             raised = begun_with._raised_from(block, self._answer)
             raised._round(block, samples, read, seen, steps, before, False, False, beyond_mps2, beyond_variance)
             assert raised._answer is not None
-            self._response.learn(block, self._answer, raised._answer)
+            self._response.learn(block, self._answer, raised._answer,
+                                 self._noise_slope(samples, self._answer, raised._answer))
             self._roughness.curvature = self._response.curvature
         return result
 
@@ -335,12 +337,14 @@ class FollowedRoad:
         self._spectrum = replace(now, log_level=level)
         self._solved_last = block, block.same_road(solution.waves, spectrum, self._spectrum)
         if self._is_coarse:
-            usable = moving if learns and self._learner is not None else None
-            improved_ones = self._improved(readings, samples, each, solution, others + left, usable)
+            improved_ones, expected, about = self._improved(readings, samples, each, solution, others + left)
+            if learns and self._learner is not None:
+                self._learn_from_bounds(expected, about, samples, moving)
             if moving.any():
                 change = np.log(improved_ones.variance[moving] / readings.variance[moving])
                 self._bounds_moved = float(np.sqrt(np.mean(change**2)))
-            self._answer = Answer(improved_ones, solution.waves, innovations, log_variance, gain, ratio, seen, free)
+            self._answer = Answer(improved_ones, moving, expected, about, solution.waves, innovations, log_variance,
+                                  gain, ratio, seen, free)
             # Bounds and road go along with the level.
             rise = self._roughness.solved_with(first, block.count) - log_variance
             self._gaussian = self._response.readings_at(improved_ones, np.repeat(block.felt(rise), reads))
@@ -362,34 +366,53 @@ class FollowedRoad:
         return first_guess(samples.reading_mps2.ravel(), self.sensor) if self._gaussian is None else self._gaussian
 
     def _improved(self, readings: GaussianReadings, samples: RoadSamples, read: Bools, solution: Solution,
-                  others: Array, usable: Bools | None) -> GaussianReadings:
-        """Another round for the bounds, with the variance (y,) that all other readings leave of each acceleration; the
-        readings that are ``read`` (y,) count. The noise is learned of those that are ``usable`` (y,), if any."""
-        low, high = bounds(samples.reading_mps2.ravel(), samples.at_end.ravel(), self.sensor.step_mps2)
+                  others: Array) -> tuple[GaussianReadings, Array, Array]:
+        """Another round for the bounds, with the variance (y,) that all other readings leave of each acceleration, and
+        what they say of it, as ``without_own``; the readings that are ``read`` (y,) count."""
+        low, high = self._bounds(samples)
         others = others + unexplained(solution.fitted_mps2[read], low[read], high[read], self._noise_variance)
         fitted_variance = 1 / (1 / others + 1 / readings.variance)
-        if usable is not None:
-            expected, about = without_own(readings, solution.fitted_mps2, fitted_variance)
-            self._learn_from_bounds(expected, about + self._beside_road, low, high, usable,
-                                    samples.reading_mps2.shape[1])
-        return improved(readings, low, high, solution.fitted_mps2, fitted_variance, self._noise_variance)
+        expected, about = without_own(readings, solution.fitted_mps2, fitted_variance)
+        return improved(readings, low, high, expected, about, self._noise_variance), expected, about
+
+    def _bounds(self, samples: RoadSamples) -> tuple[Array, Array]:
+        return bounds(samples.reading_mps2.ravel(), samples.at_end.ravel(), self._step_mps2)
 
     @property
     def _noise_variance(self) -> float:
         """Of a reading about the road's part of it, before it is rounded [(m/s2)2]."""
         return self.sensor.noise_rms_mps2**2 + self._beside_road
 
-    def _learn_from_bounds(self, expected: Array, others: Array, low: Array, high: Array, usable: Bools, reads: int
-                           ) -> None:
-        """What readings in the middle of the block, which have settled, say of the noise: each of them once."""
+    def _noise_evidence(self, expected: Array, others: Array, samples: RoadSamples, usable: Bools, newest: int
+                        ) -> tuple[Array, int]:
+        """What readings in the middle of the block, which have settled, say of the noise, and how many they are."""
+        assert self._learner is not None
+        reads = samples.reading_mps2.shape[1]
         last = len(usable) - _SETTLED_SAMPLES * reads
-        part = slice(max(last - self._unscored * reads, 0), last)
-        inner = usable[part] & np.isfinite(high[part] - low[part])
+        part = slice(max(last - newest * reads, 0), last)
+        low, high = self._bounds(samples)
+        inner = np.arange(len(usable))[part][(usable & np.isfinite(high - low))[part]]
+        evidence = interval_evidence(expected[inner], others[inner] + self._beside_road, low[inner], high[inner],
+                                     self._learner.log_noise)
+        return evidence, len(inner)
+
+    def _learn_from_bounds(self, expected: Array, others: Array, samples: RoadSamples, usable: Bools) -> None:
+        """From each reading once."""
+        assert self._learner is not None
+        evidence, count = self._noise_evidence(expected, others, samples, usable, self._unscored)
         self._unscored = 0
-        expected, others, low, high = (row[part][inner] for row in (expected, others, low, high))
-        if inner.any():
-            assert self._learner is not None
-            self._believe(interval_evidence(expected, others, low, high, self._learner.log_noise))
+        if count:
+            now = int(np.argmin(np.abs(self._learner.log_noise - log(self.sensor.noise_rms_mps2))))
+            self._believe(self._response.with_level(evidence, count, now))
+
+    def _noise_slope(self, samples: RoadSamples, answer: Answer, raised: Answer) -> Array | None:
+        """By how much the log evidence of a reading for noises rises with the road's log level; None: not learned."""
+        if self._learner is None:
+            return None
+        (one, count), (other, _) = (
+            self._noise_evidence(each.expected, each.others, samples, answer.moving, _COMPARED_SAMPLES)
+            for each in (answer, raised))
+        return (other - one) / max(count, 1) / RISE
 
     def _learn_from_residual(self, slope_and_freedom: tuple[float, float], weight: Array) -> None:
         """What a block says of the noise, as far as its readings are new: slope and freedom of ``noise_slope`` for a

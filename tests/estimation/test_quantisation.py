@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from logger.estimation.quantisation import GaussianReadings, bounds, first_guess, improved, unexplained
+from logger.estimation.quantisation import GaussianReadings, bounds, first_guess, improved, unexplained, without_own
 from logger.estimation.sensor_noise import Sensor
 
 COARSE = Sensor(noise_rms_mps2=0.1, step_mps2=0.6)
@@ -33,7 +33,8 @@ def by_rounds(
     for _ in range(rounds):
         variance = 1 / (deviation**-2 + (1 / readings.variance).sum())
         mean = variance * (readings.value_mps2 / readings.variance).sum()
-        readings = improved(readings, low, high, np.full(len(reading), mean), variance, sensor.noise_rms_mps2**2)
+        readings = improved(readings, low, high, *without_own(readings, np.full(len(reading), mean), variance),
+                            sensor.noise_rms_mps2**2)
     return mean, np.sqrt(variance)
 
 
@@ -82,7 +83,8 @@ def test_two_neighbours_that_go_together() -> None:
     for _ in range(40):
         covariance = np.linalg.inv(np.linalg.inv(prior) + np.diag(1 / readings.variance))
         fitted = covariance @ (readings.value_mps2 / readings.variance)
-        readings = improved(readings, low, high, fitted, covariance[0, 0], COARSE.noise_rms_mps2**2)
+        readings = improved(readings, low, high, *without_own(readings, fitted, covariance[0, 0]),
+                            COARSE.noise_rms_mps2**2)
     assert fitted == pytest.approx([mean, mean], abs=0.005)
     assert np.sqrt(covariance[0, 0]) == pytest.approx(np.sqrt(alone @ (axis - mean) ** 2), rel=0.02)
 
@@ -110,7 +112,7 @@ def test_a_solution_far_from_the_readings_stays_finite(off: float) -> None:
     low, high = bounds(reading, np.zeros(2), COARSE.step_mps2)
     readings = first_guess(reading, COARSE)
     for _ in range(5):
-        readings = improved(readings, low, high, reading + off, 1e-4, COARSE.noise_rms_mps2**2)
+        readings = improved(readings, low, high, *without_own(readings, reading + off, 1e-4), COARSE.noise_rms_mps2**2)
         assert np.isfinite(readings.value_mps2).all() and (readings.variance > 0).all()
 
 
