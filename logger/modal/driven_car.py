@@ -169,7 +169,8 @@ def fit_car(vehicle: Vehicle, pieces: Periodograms, rate_hz: float) -> CarFit:
     found, information, settled = min((_descend(model, one) for one in starts), key=lambda each: each[0].cost)
     x = found.x
     if not settled:
-        raise UnlikeCar("the fit of this car's parameters to the record does not converge")
+        raise UnlikeCar("the fit of this car's parameters to the record does not converge: expected a longer drive, or "
+                        "one at several speeds")
     bands_hz, share = _shares(pieces, found.spectrum)
     covariance = np.asarray(np.linalg.inv(information)[:-2, :-2], dtype=np.float64)
     return CarFit(model.car.vehicle_with(np.exp(x[:-2])), model.names, covariance, float(x[-2]), bands_hz, share)
