@@ -164,7 +164,7 @@ class Installation:
         unit = self._place("etc/systemd/system/ridelog.service")
         if unit.exists():
             return self._command("systemctl", "stop", "ridelog.service", "ridelog-export@*.service",
-                                 "ridelog-car.service")
+                                 "ridelog-car*.service")  # an older ridelog put no such unit
         return InstallationStep(f"nothing to stop: no {unit}")
 
     def _put_record(self, digests: dict[str, str]) -> InstallationStep:

@@ -10,7 +10,7 @@ from typing import Annotated
 
 from logger.errors import RidelogError
 from logger.question import Checked, Option, Question, Verb
-from logger.service.config import find_config, learned_cars, learns_car, load_config
+from logger.service.config import find_config, learned_path, learns_car, load_config
 from logger.service.systemd_notify import Stop, stopped_by_signals
 from logger.store.log.log_name import log_name
 
@@ -53,11 +53,10 @@ def _learned(settings: Path) -> Checked:
     config = load_config(settings)
     folder = config.log.directory
     logs = [name.session for path in folder.glob("*.csv") if (name := log_name(path))]
-    if config.wheelbase_m is None or not logs or max(logs) in learned_cars(folder):
+    if config.wheelbase_m is None or not logs or config.vehicle == (path := learned_path(folder, max(logs))):
         return Checked("no new drives", {}, True)
     mass = ("--mass", f"{config.mass_kg:g}") if config.mass_kg else ()
-    words = ("learn-car", folder, "--wheelbase", f"{config.wheelbase_m:g}", *mass, "--out",
-             folder / f"car-{max(logs):05d}.yaml")
+    words = ("learn-car", folder, "--wheelbase", f"{config.wheelbase_m:g}", *mass, "--out", path)
     return Checked("", {}, subprocess.run([Path(sys.executable).with_name("ridelog"), *words]).returncode == 0)
 
 

@@ -7,6 +7,7 @@ Solution. One dataclass per section holds of each key its default and how it is 
 ``config/ridelog.yaml`` is the documentation, and holds every key with its default.
 """
 
+import logging
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from datetime import date
@@ -26,6 +27,8 @@ from logger.store.formats.yaml_nodes import Node, load_mapping
 from logger.store.log.log_name import CAR
 from logger.units import WINDOW_M
 from logger.vehicle.vehicle import GENERIC
+
+log = logging.getLogger(__name__)
 
 MACHINE_CONFIG = Path("/etc/ridelog/ridelog.yaml")
 
@@ -231,14 +234,28 @@ def load_config(path: Path) -> Config:
         return config
     if config.wheelbase_m is None:
         raise BadInput(f"{path}: vehicle: auto: expected wheelbase_m, which drives are compared with, found none")
-    learned = learned_cars(config.log.directory)
-    return replace(config, vehicle=learned[max(learned)] if learned else vehicle_file(GENERIC))
+    return replace(config, vehicle=_learned_car(config.log.directory) or vehicle_file(GENERIC))
 
 
-def learned_cars(folder: Path) -> dict[int, Path]:
-    """Cars that ``vehicle: auto`` learned from the logs in a folder, by the last session that each was learned from. A
-    car keeps its file, so that a recording can be replayed with the one it was driven with."""
-    return {int(match[1]): path for path in folder.glob("car-*.yaml") if (match := CAR.fullmatch(path.name))}
+def learned_path(folder: Path, session: int) -> Path:
+    """The file of what ``vehicle: auto`` learns from the logs in a folder, up to those of a session. A car keeps its
+    file, so that a recording can be replayed with the one it was driven with."""
+    return folder / f"car-{session:05d}.yaml"
+
+
+def _learned_car(folder: Path) -> Path | None:
+    """The last car that was learned. Nobody is there to take away a file that a card has spoilt: it is passed over."""
+    from logger.store.formats.vehicle_file import read_on_board
+
+    sessions = [int(match[1]) for path in folder.glob("car-*.yaml") if (match := CAR.fullmatch(path.name))]
+    for path in (learned_path(folder, one) for one in sorted(sessions, reverse=True)):
+        try:
+            read_on_board(path)
+        except (BadInput, OSError) as error:
+            log.warning("vehicle: auto: passed over %s", error)
+        else:
+            return path
+    return None
 
 
 def learns_car(path: Path) -> bool:

@@ -93,7 +93,7 @@ def test_the_steps_on_a_machine_are_exactly_these(tmp_path: Path) -> None:
     take(installation(tmp_path, [], OTHER_PROGRAM).install())
     undone = OnThisMachine(tmp_path, OTHER_PROGRAM, run_command).uninstall()
     assert [step.words.replace(str(tmp_path), "") for step in undone] == [
-        "run systemctl stop ridelog.service ridelog-export@*.service ridelog-car.service",
+        "run systemctl stop ridelog.service ridelog-export@*.service ridelog-car*.service",
         "remove /etc/systemd/system/multi-user.target.wants/ridelog.service",
         "remove /usr/local/bin/ridelog",
         "remove /etc/sysusers.d/ridelog.conf",

@@ -310,6 +310,18 @@ def test_vehicle_auto_is_what_the_box_learned_of_its_drives(runs: list[Path], tm
         load_config(settings)
 
 
+def test_a_learned_car_that_a_card_has_spoilt_is_passed_over(
+        tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    settings = tmp_path / "ridelog.yaml"
+    settings.write_text(f"vehicle: auto\nwheelbase_m: 2.68\nlog: {{directory: {tmp_path}}}\n")
+    (tmp_path / "car-00009.yaml").write_bytes(bytes(512))
+    assert load_config(settings).vehicle == vehicle_file("generic")
+    whole = tmp_path / "car-00008.yaml"
+    whole.write_bytes(vehicle_file("rav4-2009").read_bytes())
+    assert load_config(settings).vehicle == whole
+    assert caplog.messages and all("car-00009.yaml" in one for one in caplog.messages)
+
+
 def test_logs_that_keep_nothing_or_what_cannot_be_are_refused_in_one_line(tmp_path: Path) -> None:
     for number, (kept, said) in enumerate((({}, "found none in 1 file:"), ({"form": 9}, "leave the log out"),
                                            ({"form": 1, "noise": 1e-4, "data": "AAAA"}, "leave the log out"))):

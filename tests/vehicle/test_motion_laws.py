@@ -515,6 +515,17 @@ def test_the_examples_of_the_page_do_as_they_say(tmp_path: Path) -> None:
     assert did.forces[-1] == pytest.approx(0.0, abs=0.5)
 
 
+@pytest.mark.parametrize("sharpness", [0.5, 4.0, 100.0, 1000.0])
+def test_a_sharp_force_limit_leaves_small_forces_as_they_are(sharpness: float) -> None:
+    one = effect("force_limit", limit_n=20.0, sharpness_ratio=sharpness)
+    pushes = np.array([[-1e-6, 0.0, 2.0], [-1e5, 1e6, 1e9]])
+    small, large = one.effect.force(SimpleNamespace(**one.values), 100.0, pushes)
+    assert large == pytest.approx([-20.0, 20.0, 20.0])
+    if sharpness > 1:
+        assert small == pytest.approx(pushes[0], rel=1e-4)
+    assert np.abs(small / 20) ** sharpness == pytest.approx(np.tanh(np.array([5e-8, 0.0, 0.1]) ** sharpness))
+
+
 def test_which_a_search_tries_unasked() -> None:
     model = CarModel(RIG, ())
     assert {"hysteresis", "frame_friction"}.isdisjoint(known_effects(model, [])[0])

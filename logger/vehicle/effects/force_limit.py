@@ -10,8 +10,8 @@ import numpy as np
 from logger.arrays import Array
 from logger.vehicle.effect import ActuatorEffect, Parameter, Scale, Sought, Values
 
-_SATURATED = 20.0
-"""Of which tanh is 1 in double precision."""
+_SMALLEST, _SATURATED = 1e-9, 20.0
+"""Of which tanh is itself, and 1, in double precision."""
 
 
 class ForceLimit(ActuatorEffect):
@@ -29,9 +29,9 @@ class ForceLimit(ActuatorEffect):
     refinements = ("sharpness_ratio",)
 
     def force(self, p: Values, rate_hz: float, force_n: Array) -> Array:
-        whole = _SATURATED ** (1 / p.sharpness_ratio)
-        share = np.minimum(np.abs(force_n / p.limit_n), whole) ** p.sharpness_ratio
-        return np.asarray(p.limit_n * np.copysign(np.tanh(share) ** (1 / p.sharpness_ratio), force_n))
+        share = np.minimum(np.abs(force_n / p.limit_n), _SATURATED ** (1 / p.sharpness_ratio))
+        power = np.maximum(share ** p.sharpness_ratio, _SMALLEST)  # of small forces it is 0 in double precision
+        return np.asarray(p.limit_n * np.copysign(share * (np.tanh(power) / power) ** (1 / p.sharpness_ratio), force_n))
 
 
 EFFECT = ForceLimit()
