@@ -214,7 +214,7 @@ def design_error(weighting: Weighting, sections: Sections, rate_hz: float, band_
 
 
 def design_sections(weighting: Weighting, rate_hz: float) -> Sections:
-    """Sections whose magnitude is within 0.02 dB of the formula up to 0.4 of the rate, DELAY_SAMPLES late.
+    """Sections whose magnitude is within 0.02 dB of the formula up to ``PASS_OF_RATE``, DELAY_SAMPLES late.
 
     rate_hz: at least 80 Hz. Raises ValueError for a lower rate, and where the promise could not be kept.
     """

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from logger.api.learn_car import _check_braking
 from logger.errors import BadInput
 from logger.estimation.drive_spectra import (
     BLOCK_S,
@@ -24,6 +25,7 @@ from logger.identification.unknown_car import BlockRoads, CarKnowledge, LearnedC
 from logger.service import wiring
 from logger.service.config import load_config
 from logger.shipped import vehicle_file
+from logger.store.formats.drive_file import Drive
 from logger.store.formats.vehicle_file import read_model
 from logger.store.log.log_writer import SegmentLog
 from logger.vehicle.uncertain import cars_off
@@ -81,6 +83,15 @@ def test_a_wrong_wheelbase_is_named(runs: list[Path], wrong_m: float) -> None:
     found = called("learn-car", *runs, "--wheelbase", wrong_m)
     assert found.returncode == 1 and found.stdout == ""
     assert "the distance that the drives show, 2.6" in found.stderr and len(found.stderr.splitlines()) == 1
+
+
+def test_short_drives_at_one_speed_are_of_no_other_axis_by_chance(tmp_path: Path) -> None:
+    rng, count = np.random.default_rng(0), 1300
+    for _ in range(300):
+        speed, off = (np.repeat(rng.normal(mean, 0.1, 13), 100) for mean in (20.0, 0.0))
+        felt = rng.normal(0.0, 0.5, count) + off
+        _check_braking("drive", Drive(tmp_path, 100.0, np.arange(count) / 100, felt, speed, np.cumsum(speed) / 100,
+                                      None, None))
 
 
 @pytest.mark.parametrize("beside", [0.1, 0.5])
