@@ -62,9 +62,10 @@ class Beginning:
 
 def begins_unknown(car: Car, run: Run) -> bool:
     """Whether the initial state of a run matters: of what nothing drives, of a rig whose record begins in a motion with
-    a longer time constant than what is left out of it, or of a part with a memory."""
+    a longer time constant than what is left out of it (nothing is of one that is known to rest), or of a part with a
+    memory."""
     if run.past is Past.DRIVEN:
-        return run.begins_in_motion and car.structure.slowest_decay_per_s * run.skip_s < 1
+        return run.skip_s > 0 and run.begins_in_motion and car.structure.slowest_decay_per_s * run.skip_s < 1
     return run.past is Past.FREE or car.memories > 0
 
 

@@ -13,6 +13,9 @@ from logger.api.lab.checks import driven_stretches, thinned_runs, unexplained_up
 from logger.errors import BadInput
 from logger.profiles.excitation import AppliedForce, Excitation
 from logger.runs import CLIPPED, NO_READING, READING, SKIP_S
+from logger.simulation.virtual_drive import begins_unknown
+from logger.vehicle.compose import compose
+from logger.vehicle.vehicle import Axle, Vehicle
 
 from ..support.lab.runs_with_residual import a_run
 
@@ -93,3 +96,7 @@ def test_a_rig_that_rests_until_it_is_struck_loses_no_beginning(rang_mps2: float
     (run,) = driven_stretches(Run(Path("run"), 500.0, time_s, rings + noise, still, still, None, None,
                                   excitation=struck), shortest_s=3.0)
     assert run.first == (1000 if rang_mps2 else 0)
+    if not rang_mps2:
+        noisy = replace(run, measured_mps2=run.measured_mps2 + rng.normal(0, 0.5, 2000))
+        car = compose(Vehicle("rig", "single_mass", 1.0, None, Axle(0.0, 0.0, 1421.0, 4.0, 0.0), None, 0.0))
+        assert noisy.begins_in_motion and not begins_unknown(car, noisy)
