@@ -196,6 +196,7 @@ JUMP_M = 100.0  # among houses the places of a standing car move by some tens of
 HELD_MPS = 2.0  # receivers that hold their places do so at walking pace
 LONGEST_US = 180 * US_PER_S
 LONGEST_M = 1500.0
+AGREES_M = 100.0
 LASTING_US = 60 * US_PER_S
 
 
@@ -285,7 +286,7 @@ class SpeedCheck:
             return
         longer_m = max(by_speed_m, by_places_m)
         agrees = abs(by_places_m - by_speed_m) <= SHARE * longer_m + random_m
-        if lasted_us >= LONGEST_US or longer_m >= (JUMP_M if self._lasts else LONGEST_M):
+        if lasted_us >= LONGEST_US or longer_m >= (AGREES_M if self._lasts else LONGEST_M):
             self._lasts = self._lasts and not agrees
             self._begin(timed)
 
