@@ -303,7 +303,7 @@ def begin_search(posterior: Posterior, effects: Mapping[str, Effect], present: S
     before = refit(posterior, nominal) if unknown is None else unknown.fitted(posterior, present)
     search: Search[Baseline, Screened, CandidateFit] = Search(
         tried, len(present), misalignment(posterior, nominal), progress,
-        effort=SearchEffort() if unknown is None else SearchEffort(fitted=3, beginnings=0),
+        effort=SearchEffort() if unknown is None else SearchEffort(fitted=3),
         likelihood=unknown or MeasuredRoad())
     return search, before
 

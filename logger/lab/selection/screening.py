@@ -2,9 +2,8 @@
 
 Problem: most effects do nothing at their null and something quite different at each of their values, so that a
 derivative at zero strength says little about them (a shape such as a knee or a frequency has no meaning there).
-Solution: each is simulated at a few trial values; what the numbers of the car and of its effects and the distance
-errors could do as well is projected out (C. R. Rao's score test, Proc. Cambridge Phil. Soc. 44, 1948), and the trial
-that explains most, at its best strength, is where a fit begins.
+Solution: each is simulated at a few trial values; what the car's own numbers and the distance errors could do as well
+is projected out (a score test), and the trial that explains most, at its best strength, is where a fit begins.
 """
 
 from __future__ import annotations
@@ -19,7 +18,7 @@ import numpy as np
 from logger.arrays import Array
 from logger.fitting.fisher_scoring import inverse
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import align, effect_slopes, own_slopes
+from logger.lab.likelihood.map_fit import align, effect_slopes
 from logger.lab.likelihood.noise_floor import excess_over_noise, gain_of_full_explanation
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.whittle import UNEXPLAINED
@@ -37,76 +36,66 @@ _STRONGEST, _STRONGEST_SHIFT, _WEAKEST = 10.0, 1000.0, 0.03
 
 @dataclass(frozen=True, eq=False)
 class _Quadratic:
-    """The objective of a fitted model to second order in the numbers of the car (p) and of its effects (m).
+    """The objective of a fitted model to second order in the car's numbers.
 
-    own            whitened derivatives by the latter (m, kept), per run
     residuals      whitened (kept,) per run
-    covariance     of all these numbers (p + m, p + m)
-    newton_step    of these to the minimum (p + m,)
+    covariance     of the car's numbers (p, p)
+    newton_step    of these to the minimum (p,)
     objective      there: sum of squares of the residuals and cost of the priors
     """
 
-    own: list[Array]
+    linear: LinearModel
     residuals: list[Array]
     covariance: Array
     newton_step: Array
     objective: float
 
     @staticmethod
-    def of(linear: LinearModel, own: list[Array]) -> _Quadratic:
+    def of(linear: LinearModel) -> _Quadratic:
         """The quadratic of a linearised model."""
         state = linear.state
         here = linear.fit_record_errors(state.predictions)
-        covariance = inverse(linear.information(own))
-        gradient = linear.gradient(here.residuals, state.logs, own)
+        covariance = np.asarray(np.linalg.inv(linear.information()), float)
+        gradient = linear.gradient(here.residuals, state.logs)
         step = covariance @ gradient
-        return _Quadratic(own, here.residuals, covariance, step,
+        return _Quadratic(linear, here.residuals, covariance, step,
                           here.squares + linear.prior.cost(state.logs) - float(gradient @ step))
-
-    def beside(self, white: Sequence[Array]) -> list[Array]:
-        """Whitened columns (k, kept), per run, below those of the effects' numbers."""
-        return [np.vstack(pair) for pair in zip(self.own, white, strict=True)]
 
 
 @dataclass(frozen=True, eq=False)
 class Baseline:
     """A fitted model that effects are tried on.
 
-    linear           linearised at its state
     score            minus twice the log of its evidence
     explanation      gain of a full explanation of the residuals
     rough            predictions of a rough simulation, for comparison with others
+    quadratic        of its objective
     trend_removed    whether start and scale errors of the distances are taken to be 0
     """
 
-    linear: LinearModel
     score: float
     explanation: float
     rough: list[Array]
+    quadratic: _Quadratic
     trend_removed: bool = False
 
     @staticmethod
     def of(linear: LinearModel, trend_removed: bool = False) -> Baseline:
         """The baseline of a linearised model."""
         state = linear.state
-        return Baseline(linear, linear.score, gain_of_full_explanation(linear.posterior, state),
-                        linear.posterior.predict(state.effects, state.logs, state.record, rough=True), trend_removed)
-
-    @cached_property
-    def _own_slopes(self) -> list[Array] | None:
-        return own_slopes(self.posterior, self.state, self.linear.whiteners)
-
-    @cached_property
-    def quadratic(self) -> _Quadratic:
-        """Of its objective."""
-        slopes = self._own_slopes
-        return _Quadratic.of(self.linear, [np.empty((0, one.kept)) for one in self.linear.whiteners]
-                             if slopes is None else self.linear.whitened(slopes))
+        return Baseline(linear.score, gain_of_full_explanation(linear.posterior, state),
+                        linear.posterior.predict(state.effects, state.logs, state.record, rough=True),
+                        _Quadratic.of(linear), trend_removed)
 
     @property
     def posterior(self) -> Posterior:
         """The posterior that was fitted."""
         return self.linear.posterior
+
+    @property
+    def linear(self) -> LinearModel:
+        """The model linearised at its state."""
+        return self.quadratic.linear
 
     @property
     def state(self) -> State:
@@ -121,7 +110,7 @@ class Baseline:
     @cached_property
     def hold_out(self) -> HoldOut:
         """Cross-validation of the model."""
-        return cross_validate(self.linear, self._own_slopes)
+        return cross_validate(self.linear)
 
     @property
     def on_rig(self) -> bool:
@@ -315,16 +304,15 @@ def _trial_at_best_strength(base: Baseline, one: Chosen) -> Trial:
     linear, quadratic = base.linear, base.quadratic
     change = partial(_change, base, [one], base.state.logs)
     white = linear.whitened(change())
-    p, here = linear.count, base.state.logs + quadratic.newton_step[: linear.count]
-    by_car, among = linear.cross_products(quadratic.beside([one[None] for one in white]))
-    mixed, own = np.concatenate([by_car[-1], among[-1, :-1]]), float(among[-1, -1])
+    here = base.state.logs + quadratic.newton_step
+    (mixed,), ((own,),) = linear.cross_products([one[None] for one in white])
     absorbed = quadratic.covariance @ mixed
     along = (sum(float(c @ r) for c, r in zip(white, quadratic.residuals, strict=True))
              - float(mixed @ quadratic.newton_step))
     own -= float(mixed @ absorbed)
 
     def at(share: float, values: Chosen) -> Trial:
-        logs = here - share * absorbed[:p]
+        logs = here - share * absorbed
         objective = quadratic.objective - 2 * share * along + share**2 * own
         return Trial(values, quadratic.objective - objective, logs, change)
 
@@ -344,21 +332,21 @@ def _trial_at_best_strength(base: Baseline, one: Chosen) -> Trial:
 
 def _trial_at_best_strengths(base: Baseline, one: Chosen, strengths: Sequence[int]) -> Trial:
     """The trial of an effect with several strengths, its parameters at these places, after one Gauss-Newton step of
-    these, from their nulls, and of all other numbers."""
+    these and of the car's numbers from their nulls."""
     linear, state = base.linear, base.state
     nulls = {each.name: each.null for each in one.effect.parameters if each.is_free and each.null is not None}
     effects = (*state.effects, replace(one, values={**one.values, **nulls}))
     free = [FreeParameter(len(state.effects), place) for place in strengths]
     slopes = effect_slopes(base.posterior, effects, state.logs, free, state.record, None)
-    white, residuals = base.quadratic.beside(linear.whitened(slopes)), base.quadratic.residuals
+    white, residuals = linear.whitened(slopes), linear.fit_record_errors(state.predictions).residuals
     gradient, information = linear.gradient(residuals, state.logs, white), linear.information(white)
-    p, others = linear.count, len(gradient) - len(free)
+    p = linear.count
     # A point of a curve beyond all motions has no derivative, and stays at 0.
     step = inverse(information) @ gradient
-    without = float(gradient[:others] @ base.quadratic.newton_step)
-    there = with_coordinates(effects, free, coordinates_of(effects, free) + step[others:])
-    return Trial(there[-1], float(gradient @ step) - without, state.logs + step[:p],
-                 lambda: [step[others:] @ one for one in slopes])
+    without = np.linalg.solve(information[:p, :p], gradient[:p]) if p else np.empty(0)
+    there = with_coordinates(effects, free, coordinates_of(effects, free) + step[p:])
+    return Trial(there[-1], float(gradient @ step - gradient[:p] @ without), state.logs + step[:p],
+                 lambda: [step[p:] @ one for one in slopes])
 
 
 def _goes_both_ways(effect: Effect) -> bool:
@@ -377,8 +365,8 @@ def _with_predicted_gain(base: Baseline, trial: Trial) -> Trial:
 
 
 def _trial_at_values(base: Baseline, one: Chosen, besides: tuple[Chosen, ...] = ()) -> Trial:
-    """The trial at its own values; all other numbers take one Newton step, and those of the car that the effect sets
-    are held at their nominal values.
+    """The trial at its own values; the car's numbers take one Newton step, and those that the effect sets are held at
+    their nominal values.
 
     besides    what else differs
     """
@@ -386,10 +374,10 @@ def _trial_at_values(base: Baseline, one: Chosen, besides: tuple[Chosen, ...] = 
     logs = np.where(np.isin(linear.prior.names, one.effect.replaces), 0.0, base.state.logs)
     change = partial(_change, base, (one, *besides), logs)
     found = linear.fit_record_errors([fine + more for fine, more in zip(base.state.predictions, change(), strict=True)])
-    gradient = linear.gradient(found.residuals, logs, base.quadratic.own)
-    step = inverse(linear.information(base.quadratic.own)) @ gradient
+    gradient = linear.gradient(found.residuals, logs)
+    step = np.linalg.solve(linear.information(), gradient)
     objective = found.squares + linear.prior.cost(logs) - float(gradient @ step)
-    return Trial(one, base.quadratic.objective - objective, logs + step[: linear.count], change)
+    return Trial(one, base.quadratic.objective - objective, logs + step, change)
 
 
 def _realigned_trial(base: Baseline, one: Chosen, trial: Trial) -> Trial:

@@ -286,7 +286,7 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
     search: Search[RoadModel, RoadTrial, RoadCandidate] = Search(
         tried, len(present), Misalignment(1.0, 0.0), progress, likelihood=UnmeasuredRoad(progress),
         # A fit takes as long as ten over a measured road: what gains less than one number costs is not worth it.
-        effort=SearchEffort(effects=3, beginnings=0, fitted=3, fit_share=0.3))
+        effort=SearchEffort(effects=3, fitted=3, fit_share=0.3))
     selection = search.run(base)
     now, steps = selection.now, dict(selection.steps)
     names = sorted(selection.gains, key=lambda name: [*steps, name].index(name))
