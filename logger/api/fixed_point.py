@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 from logger.files import make_folder, together, write_text
 from logger.question import Option, Question, Verb
-from logger.roads.iri import TIRE_BASE_M
 
 if TYPE_CHECKING:
     from logger.api.shown import CommandResult
@@ -22,6 +21,7 @@ if TYPE_CHECKING:
     from logger.dsp.weightings.weighting import Sections, Weighting
 
 
+_SPACING_M = 0.25
 """Between the slopes of the quarter car: those of the service with ``arithmetic: fixed``."""
 
 
@@ -136,10 +136,10 @@ def _golden_car(question: FixedPointQuestion) -> _FilterHeader:
     from logger.dsp.fixed_point import FULL_SCALE_SLOPE, fixed_cascade
     from logger.roads.iri import golden_car_sections
 
-    cascade = fixed_cascade(golden_car_sections(TIRE_BASE_M), FULL_SCALE_SLOPE, data_bits=question.data_bits)
+    cascade = fixed_cascade(golden_car_sections(_SPACING_M), FULL_SCALE_SLOPE, data_bits=question.data_bits)
     return _FilterHeader(
         "ridelog_golden_car",
-        f"Golden Car of the IRI, 80 km/h, a slope every {TIRE_BASE_M:g} m, for slopes within +-{FULL_SCALE_SLOPE:g}",
+        f"Golden Car of the IRI, 80 km/h, a slope every {_SPACING_M:g} m, for slopes within +-{FULL_SCALE_SLOPE:g}",
         "m/m",
         ("In: slope of the road over 250 mm. Out: slope between body and wheel at the end of the step; the mean of its",
          "absolute value times 1000 is the IRI in m/km. Reset to the mean slope of the first 11 m."),

@@ -244,7 +244,7 @@ def conclusion(found: LabComparison) -> str:
         return ("The model lacks no effect of the car. The residual (measured - model) does not depend on the road; it "
                 "looks like coloured noise of the sensor or the engine.")
     removed = found.removed.drifting_sensors or found.removed.distance_error_m > 0
-    beside = " apart from what was removed, as shown below," * bool(removed)
+    beside = " apart from what was removed (shown below)" * bool(removed)
     return f"The model lacks nothing{beside}: after a refit, the residual (measured - model) is no more than noise."
 
 

@@ -169,7 +169,7 @@ def _read_errors(keys: Mapping[str, Node], vehicle: Vehicle, effects: Sequence[C
     rows = [[node.number(low=-1.0, high=1.0) for node in row.items()] for row in keys["correlations"].items()
             ] if "correlations" in keys else []
     if rows and [len(row) for row in rows] != list(range(len(errors))):
-        raise keys["correlations"].wrong(f"{len(errors)} rows, one for each standard error, the first without values "
+        raise keys["correlations"].wrong(f"a row for each standard error ({len(errors)}), the first without values "
                                          "and each with one value more than the row above it")
     return NumberErrors(errors, tuple(map(tuple, rows)))
 

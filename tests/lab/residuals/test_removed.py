@@ -41,7 +41,7 @@ def test_a_drift_is_named_with_its_share_and_nothing_else_is_missing() -> None:
     said = " ".join(headline(found))
     assert "The sensor drifts (an exponential of " in said and "The motion does not cause the drift" in said
     assert evidence(found) == ["No test finds more than noise in the residual."] and not found.missing
-    assert conclusion(found).startswith("The model lacks nothing beside")
+    assert conclusion(found).startswith("The model lacks nothing apart from")
     shown = comparison_json(found)
     assert shown["error"] == found.plain.error and shown["error_without_drift"] == removed.error
     assert shown["removed"]["drift"]["runs"][0]["time_s"] == pytest.approx(9.0, rel=0.1)
@@ -66,7 +66,7 @@ def test_nothing_is_named_where_nothing_is_removed() -> None:
 def test_a_wrong_place_is_named_with_its_share() -> None:
     found = compared(lambda run: replace(run, distance_m=run.distance_m + 1.0))
     assert found.removed.distance_error_m == pytest.approx(1.0, abs=0.05) and found.removed.distance_share > 0.95
-    assert not found.missing and conclusion(found).startswith("The model lacks nothing beside")
+    assert not found.missing and conclusion(found).startswith("The model lacks nothing apart from")
 
 
 @pytest.mark.slow

@@ -34,7 +34,7 @@ def test_those_of_an_effect_go_by_its_name(tmp_path: Path) -> None:
     ("standard_errors: {wings: 1}\n", "expected one of the keys"),
     ("standard_errors: {sprung_mass_kg: 0}\n", "expected a number greater than 0"),
     ("standard_errors: {dry_friction.friction_force_n: 8}\n", "expected one of the keys"),
-    ("standard_errors: {sprung_mass_kg: 9}\ncorrelations: [[], [0.5]]\n", "a row for each of 1 standard errors"),
+    ("standard_errors: {sprung_mass_kg: 9}\ncorrelations: [[], [0.5]]\n", "a row for each standard error (1)"),
     ("standard_errors: {sprung_mass_kg: 9, contact_patch_m: 0.1}\ncorrelations: [[], [1.5]]\n", "from -1 to 1"),
 ])
 def test_what_is_wrong_is_said_with_its_line(tmp_path: Path, added: str, words: str) -> None:
