@@ -9,7 +9,7 @@ them. What cannot be identified is computed from the information of these drives
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
-from functools import cached_property, partial
+from functools import partial
 
 import numpy as np
 
@@ -17,7 +17,6 @@ from logger.dsp.resample import PASS_OF_RATE
 from logger.fitting.fisher_scoring import integrated_out, inverse
 from logger.identification.identifiability import NOT_ONE_ROAD, Finding, structural
 from logger.lab.diagnosis import CandidateEffect, candidates_of
-from logger.lab.likelihood.noise_floor import NoiseLevel
 from logger.lab.likelihood.standard_errors import with_standard_errors
 from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
@@ -28,8 +27,8 @@ from logger.lab.selection.stepwise import Likelihood, Search, SearchEffort, name
 from logger.lab.unknown_road.same_road import (
     NotOneRoad,
     RoadFitState,
+    RoadModel,
     SameRoad,
-    SameRoadFit,
     TrialOnRoad,
     certain_two_roads,
     fit,
@@ -99,89 +98,8 @@ class UnknownRoadDiagnosis:
         return self.excess > UNEXPLAINED
 
 
-@dataclass(frozen=True, eq=False)
-class RoadModel:
-    """A fitted model of drives over an unknown road; ``score`` is over that of the first model of a search, as only
-    differences are known."""
-
-    fit: SameRoadFit
-    score: float = 0.0
-
-    @property
-    def problem(self) -> SameRoad:
-        """The drives, with a preconditioner for states near this one."""
-        return self.fit.problem
-
-    @property
-    def state(self) -> RoadFitState:
-        """All its numbers."""
-        return self.fit.state
-
-    @property
-    def effects(self) -> tuple[Chosen, ...]:
-        """With their values."""
-        return self.state.effects
-
-    @cached_property
-    def hold_out(self) -> HoldOut:
-        """Each drive as predicted by the others; of the likelihood only differences are known."""
-        return HoldOut(self.problem.error(self.state), float("nan"))
-
-    @cached_property
-    def noise(self) -> NoiseLevel:
-        """The sensor's noise by what this model leaves."""
-        return self.problem.noise(self.state)
-
-    @cached_property
-    def explanation(self) -> float:
-        """Decrease of minus twice the log-likelihood if what no road explains were just small enough to count as
-        explained; at least 0."""
-        over = self.state.noise_mps2 / ((1 + UNEXPLAINED) * self.noise.deviation_mps2)
-        return max(0.0, 2 * PASS_OF_RATE * self.problem.samples * 2 * float(np.log(over)))
-
-
-@dataclass(frozen=True, eq=False)
-class RoadTrial:
-    """An effect as it was screened: where fits may begin, the largest gain first."""
-
-    starts: tuple[TrialOnRoad, ...]
-
-    @property
-    def effect(self) -> Effect:
-        """The effect."""
-        return self.starts[0].chosen.effect
-
-    @property
-    def gain(self) -> float:
-        """The largest gain."""
-        return self.starts[0].gain
-
-
-@dataclass(frozen=True, eq=False)
-class RoadCandidate:
-    """A model with one more effect, its last, and its gain in minus twice the log of the evidence."""
-
-    model: RoadModel
-    gain: float
-
-    @property
-    def chosen(self) -> Chosen:
-        """The effect, with its values."""
-        return self.model.effects[-1]
-
-    @property
-    def effect(self) -> Effect:
-        """The effect."""
-        return self.chosen.effect
-
-    @property
-    def hold_out(self) -> HoldOut:
-        """Each drive as predicted by the others."""
-        return self.model.hold_out
-
-
 @dataclass(frozen=True)
-class UnmeasuredRoad(Likelihood["RoadModel", "RoadTrial", "RoadCandidate"]):
+class UnmeasuredRoad(Likelihood[RoadModel, TrialOnRoad, RoadModel]):
     """The likelihood of drives over one road that nobody measured, as a search asks for it. Places are numbers of the
     road, to which most of the power belongs, and a colour of the noise is not told from a road: what a search asks of
     these has the answers that a likelihood has by default.
@@ -196,16 +114,16 @@ class UnmeasuredRoad(Likelihood["RoadModel", "RoadTrial", "RoadCandidate"]):
     first_steps: int = 2
 
     def screened(self, base: RoadModel, effects: Sequence[Effect], seen: Misalignment, near: Chosen | None,
-                 pool: ThreadPoolExecutor, progress: Progress) -> list[RoadTrial]:
+                 pool: ThreadPoolExecutor, progress: Progress) -> list[TrialOnRoad]:
         """Effects screened by score tests at their trial values, all at once."""
         known = {} if near is None else near.values
         trials = [chosen(one, values) for one in effects
                   for values in (*one.trials(), *([one.trials()[0] | shared_parameters(one, known)] if known else []))]
         progress(f"screening {len(effects)} effects")
         by_effect: dict[str, list[TrialOnRoad]] = {}
-        for one in sorted(screen(base.problem, base.fit, trials), key=lambda one: -one.gain):
-            by_effect.setdefault(one.chosen.effect.name, []).append(one)
-        return [RoadTrial(tuple(ones)) for ones in by_effect.values()]
+        for one in sorted(screen(base, trials), key=lambda one: -one.gain):
+            by_effect.setdefault(one.effect.name, []).append(one)
+        return [replace(first, others=tuple(others)) for first, *others in by_effect.values()]
 
     def without(self, now: RoadModel, name: str) -> RoadModel:
         """The model without an effect, fitted."""
@@ -213,42 +131,40 @@ class UnmeasuredRoad(Likelihood["RoadModel", "RoadTrial", "RoadCandidate"]):
         there = fit(now.problem, self._state(now, effects))
         lost = there.problem.gain(there.state, now.state) - self._cost(now, next(
             one for one in now.effects if one.effect.name == name))
-        return RoadModel(replace(there, problem=there.problem.preconditioned(there.state)), now.score + lost)
+        return replace(there, problem=there.problem.preconditioned(there.state), score=now.score + lost)
 
-    def fitted_roughly(self, score: float, base: RoadModel, one: RoadTrial, least: float) -> list[RoadCandidate]:
+    def fitted_roughly(self, score: float, base: RoadModel, one: TrialOnRoad, least: float) -> list[RoadModel]:
         """The best of fits of some steps."""
-        first = one.starts[0]
-        begins = [first.best, *(start.chosen for start in one.starts[: self.starts] if start.gain > 0.5 * first.gain)]
+        begins = [one.best, *(start.chosen for start in (one, *one.others)[: self.starts]
+                              if start.gain > 0.5 * one.gain)]
         tries = [fit(base.problem, self._state(base, (*base.effects, begin)), self.first_steps) for begin in begins]
         return [max((self._candidate(base, there, score, 2) for there in tries), key=lambda one: one.gain)]
 
-    def refined(self, base: RoadModel, one: RoadCandidate, least: float) -> RoadCandidate:
+    def refined(self, base: RoadModel, one: RoadModel, least: float) -> RoadModel:
         """The fit to its end; one that gains less by its first steps than its numbers cost is not fitted further."""
         if one.gain <= 0:
             return one
-        further = self._candidate(base, fit(one.model.problem, one.model.state), base.score, 3)
+        further = self._candidate(base, fit(one.problem, one.state), base.score, 3)
         return max(further, one, key=lambda one: one.gain)  # steps may diverge
 
-    def with_effect(self, one: RoadCandidate) -> RoadModel:
+    def with_effect(self, one: RoadModel) -> RoadModel:
         """The model with the effect fitted to its end, its equations near it, and its drives laid on each other anew
         where their distances are a receiver's."""
-        now, score = fit(one.model.problem, one.model.state), one.model.score
-        if (gain := now.problem.gain(one.model.state, now.state)) > 0:
-            score -= gain
-        else:
-            now = one.model.fit
+        now = fit(one.problem, one.state)
+        gain = now.problem.gain(one.state, now.state)
+        now = replace(now, score=one.score - gain) if gain > 0 else one
         if now.problem.exact_places:
-            return RoadModel(replace(now, problem=now.problem.preconditioned(now.state)), score)
-        return RoadModel(_placed_anew(now, self.progress), score)
+            return replace(now, problem=now.problem.preconditioned(now.state))
+        return replace(_placed_anew(now, self.progress), score=now.score)
 
     def chance(self, one: Chosen, gain: float, base: RoadModel, candidates: int) -> float:
         """The bound of the evidence: a gain that is integrated from slopes of simulated drives is too rough for more.
         """
         return probability_by_chance(gain, candidates)
 
-    def is_doubtful(self, base: RoadModel, one: RoadCandidate) -> bool:
+    def is_doubtful(self, base: RoadModel, one: RoadModel) -> bool:
         """Whether a fit is at an end of its range, or predicts drives by the others worse."""
-        return one.chosen.at_bound or one.model.hold_out.error > base.hold_out.error
+        return one.chosen.at_bound or one.hold_out.error > base.hold_out.error
 
     def _state(self, base: RoadModel, effects: tuple[Chosen, ...]) -> RoadFitState:
         """The state of a model with other effects."""
@@ -258,10 +174,10 @@ class UnmeasuredRoad(Likelihood["RoadModel", "RoadTrial", "RoadCandidate"]):
         """What the numbers of an effect cost of its gain (G. Schwarz 1978)."""
         return len(free_parameters_of([one])) * float(np.log(base.problem.samples))
 
-    def _candidate(self, base: RoadModel, there: SameRoadFit, score: float, nodes: int) -> RoadCandidate:
+    def _candidate(self, base: RoadModel, there: RoadModel, score: float, nodes: int) -> RoadModel:
         """A fit with one more effect than a model."""
-        gain = there.problem.gain(base.state, there.state, nodes=nodes) - self._cost(base, there.state.effects[-1])
-        return RoadCandidate(RoadModel(there, base.score - gain), score - base.score + gain)
+        gain = there.problem.gain(base.state, there.state, nodes=nodes) - self._cost(base, there.chosen)
+        return replace(there, score=base.score - gain, gain=score - base.score + gain)
 
 
 def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
@@ -282,8 +198,8 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
     progress("refitting the model's parameters and the road")
     before = fit(problem.preconditioned(nominal), nominal)
     as_filed = before.problem.error(replace(nominal, roads=before.state.roads))
-    base = RoadModel(replace(before, problem=before.problem.moved_as(before.state)))
-    search: Search[RoadModel, RoadTrial, RoadCandidate] = Search(
+    base = replace(before, problem=before.problem.moved_as(before.state))
+    search: Search[RoadModel, TrialOnRoad, RoadModel] = Search(
         tried, len(present), Misalignment(1.0, 0.0), progress, likelihood=UnmeasuredRoad(progress),
         # A fit takes as long as ten over a measured road: what gains less than one number costs is not worth it.
         effort=SearchEffort(effects=3, fitted=3, fit_share=0.3))
@@ -291,10 +207,9 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
     now, steps = selection.now, dict(selection.steps)
     names = sorted(selection.gains, key=lambda name: [*steps, name].index(name))
     remaining = [one for one in tried if one.name not in names_of(now)]
-    usual = {one.chosen.effect.name: one for one in screen(now.problem, now.fit, [
-        chosen(one, one.usual) for one in remaining])}
+    usual = {one.effect.name: one for one in screen(now, [chosen(one, one.usual) for one in remaining])}
     road = {name: one.share_beyond_road for name, one in usual.items() if one.share_beyond_road < ABSORBED_BY_ROAD}
-    by_name = {one.effect.name: one for one in _with_errors(now.fit)}
+    by_name = {one.effect.name: one for one in _with_errors(now)}
     way = [ErrorStep(AS_FILED, as_filed), ErrorStep(REFITTED, base.hold_out.error),
            *(ErrorStep(f"with {name}", steps.get(name, now.hold_out).error) for name in names)]
     way[-1] = way[-1]._replace(error=now.hold_out.error)
@@ -306,15 +221,15 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
         tuple(zip(before.problem.errors(before.state), now.problem.errors(now.state), strict=True)),
         now.noise.deviation_mps2 / now.problem.size_mps2, untried, road,
         {name: one.deviations for name, one in usual.items() if one.deviations < DETECTABLE_SIGMA and name not in road},
-        _confounded_numbers(now.fit), now.state.noise_mps2, _excess(now),
+        _confounded_numbers(now), now.state.noise_mps2, _excess(now),
         tuple((problem.runs[one].name, problem.runs[other].name) for one, other in possible_two_roads(agreements)),
         undecided, problem.exact_places, no_better,
     )
 
 
-def _best_of_screened(base: RoadModel, one: RoadTrial) -> tuple[Chosen, float, HoldOut]:
+def _best_of_screened(base: RoadModel, one: TrialOnRoad) -> tuple[Chosen, float, HoldOut]:
     """As ``candidates_of`` asks for it."""
-    best, problem = one.starts[0].best, base.problem
+    best, problem = one.best, base.problem
     gain = one.gain - len(free_parameters_of([best])) * float(np.log(problem.samples))
     return best, gain, HoldOut(problem.error(replace(base.state, effects=(*base.effects, best), gains=problem.response(
         (*base.effects, best), base.state.logs))), float("nan"))
@@ -348,7 +263,7 @@ def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequen
     return found
 
 
-def _placed_anew(now: SameRoadFit, progress: Progress) -> SameRoadFit:
+def _placed_anew(now: RoadModel, progress: Progress) -> RoadModel:
     """The fit with its drives laid on each other by what its car feels: by a car without its effects they lie wrong,
     and the next effect would imitate that. Laid anew they may no longer have enough of a road in common: then they stay
     where they are."""
@@ -367,14 +282,14 @@ def _placed_anew(now: SameRoadFit, progress: Progress) -> SameRoadFit:
 # --- the residual ---
 
 
-def _with_errors(model: SameRoadFit) -> tuple[Chosen, ...]:
+def _with_errors(model: RoadModel) -> tuple[Chosen, ...]:
     """The effects of a model with standard errors."""
     first, count = len(model.state.logs), len(model.free_parameters)
     deviations = np.sqrt(np.maximum(np.diag(inverse(model.information)), 0.0))[first : first + count]
     return with_standard_errors(model.state.effects, model.free_parameters, deviations)
 
 
-def _confounded_numbers(model: SameRoadFit) -> tuple[Finding, ...]:
+def _confounded_numbers(model: RoadModel) -> tuple[Finding, ...]:
     """Masses, springs and dampers that these drives cannot identify while the road is unknown, whatever their prior."""
     names = model.problem.prior.names
     own = np.array([index for index, name in enumerate(names) if not name.endswith("_distance_m")])

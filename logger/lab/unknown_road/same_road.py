@@ -37,7 +37,7 @@ from collections import defaultdict
 from collections.abc import Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from itertools import pairwise, permutations
 
 import numpy as np
@@ -63,12 +63,13 @@ from logger.lab.likelihood.lag import lags
 from logger.lab.likelihood.map_fit import ends_of
 from logger.lab.likelihood.noise_floor import NoiseLevel, sensor_noise
 from logger.lab.likelihood.priors import Tolerance, VehiclePrior
-from logger.lab.likelihood.whittle import Bands
+from logger.lab.likelihood.whittle import UNEXPLAINED, Bands
+from logger.lab.selection.holdout import HoldOut
 from logger.lab.selection.screening import scale_strength
 from logger.roads.iso8608 import STANDARD_WAVINESS
 from logger.runs import Run, normalised_rms
 from logger.vehicle.compose import Car, compose
-from logger.vehicle.effect import Chosen, Scale
+from logger.vehicle.effect import Chosen, Effect, Scale
 from logger.vehicle.linear_car import LinearCar
 from logger.vehicle.linearise import is_linear, known_car, linearised
 from logger.vehicle.named_parameters import (
@@ -440,14 +441,17 @@ def _joined(run: Run, parts: Sequence[Array]) -> Run:
 
 
 @dataclass(frozen=True, eq=False)
-class SameRoadFit:
-    """A fitted state, with the information on its numbers.
+class RoadModel:
+    """A fitted model of drives over an unknown road, with the information on its numbers.
 
     free_parameters    of its effects
     data               information of the drives on the logs, the free parameters (on their scales) and the roads'
                        numbers (m, m), at the last step for which it was computed
     information        of drives and priors (m, m)
     problem            with a preconditioner for states near this one
+    score              minus twice the log of its evidence over that of the first model of a search, as only differences
+                       are known
+    gain               by how much this is below the score of a model without the last effect
     """
 
     state: RoadFitState
@@ -455,9 +459,43 @@ class SameRoadFit:
     data: Array
     information: Array
     problem: SameRoad
+    score: float = 0.0
+    gain: float = 0.0
+
+    @property
+    def effects(self) -> tuple[Chosen, ...]:
+        """With their values."""
+        return self.state.effects
+
+    @property
+    def chosen(self) -> Chosen:
+        """The last effect, with its values."""
+        return self.effects[-1]
+
+    @property
+    def effect(self) -> Effect:
+        """The last effect."""
+        return self.chosen.effect
+
+    @cached_property
+    def hold_out(self) -> HoldOut:
+        """Each drive as predicted by the others; of the likelihood only differences are known."""
+        return HoldOut(self.problem.error(self.state), float("nan"))
+
+    @cached_property
+    def noise(self) -> NoiseLevel:
+        """The sensor's noise by what this model leaves."""
+        return self.problem.noise(self.state)
+
+    @cached_property
+    def explanation(self) -> float:
+        """Decrease of minus twice the log-likelihood if what no road explains were just small enough to count as
+        explained; at least 0."""
+        over = self.state.noise_mps2 / ((1 + UNEXPLAINED) * self.noise.deviation_mps2)
+        return max(0.0, 2 * PASS_OF_RATE * self.problem.samples * 2 * float(np.log(over)))
 
 
-def fit(problem: SameRoad, state: RoadFitState, steps: int = 10, close: float = 0.3) -> SameRoadFit:
+def fit(problem: SameRoad, state: RoadFitState, steps: int = 10, close: float = 0.3) -> RoadModel:
     """Fit the most probable state, by so many scoring steps from a state at most.
 
     close    standard errors from the end that are near enough
@@ -488,8 +526,7 @@ def fit(problem: SameRoad, state: RoadFitState, steps: int = 10, close: float = 
     logs, effects, roads = at(found.x)
     fitted = RoadFitState(effects, logs, roads, problem.response(effects, logs))
     _, precision = problem.prior_terms(logs, q, roads)
-    return SameRoadFit(fitted, tuple(free_parameters), found.information - np.diag(precision), found.information,
-                       problem)
+    return RoadModel(fitted, tuple(free_parameters), found.information - np.diag(precision), found.information, problem)
 
 
 def response_and_slopes(problem: SameRoad, effects: tuple[Chosen, ...], free_parameters: Sequence[FreeParameter],
@@ -524,6 +561,7 @@ class TrialOnRoad:
     best                 the effect at its best strength, which has this gain
     deviations           expected significance at its values, all free numbers fitted, in standard deviations
     share_beyond_road    share of its information (0 to 1) that roads and places do not absorb
+    others               the same effect at other values, where fits may begin as well, the largest gain first
     """
 
     chosen: Chosen
@@ -531,12 +569,18 @@ class TrialOnRoad:
     best: Chosen
     deviations: float
     share_beyond_road: float
+    others: "tuple[TrialOnRoad, ...]" = ()
+
+    @property
+    def effect(self) -> Effect:
+        """The effect."""
+        return self.chosen.effect
 
 
-def screen(problem: SameRoad, base: SameRoadFit, ones: Sequence[Chosen]) -> list[TrialOnRoad]:
+def screen(base: RoadModel, ones: Sequence[Chosen]) -> list[TrialOnRoad]:
     """Score tests of effects on top of a fitted model, along the change that each makes in the response; the car's
     numbers and the roads' are projected out."""
-    state = base.state
+    problem, state = base.problem, base.state
     gains, own = response_and_slopes(problem, state.effects, base.free_parameters, state.logs)
     changes = [problem.response((*state.effects, one), state.logs) - gains for one in ones]
     k, p = len(ones), len(own)

@@ -191,7 +191,7 @@ def test_the_road_takes_a_gain_and_a_contact_patch() -> None:
     problem = SameRoad([run_of([], 9.0, 85.0, 1), run_of([], 15.0, 85.0, 2)], CAR, Tolerance())
     start = problem.start()
     base = fit(problem.preconditioned(start), start)
-    gain, patch, damping = screen(base.problem, base, [
+    gain, patch, damping = screen(base, [
         named("sensor_gain", gain=1.1), named("tire_enveloping", contact_patch_m=0.4),
         named("tire_damping", tire_damping_n_s_per_m=300.0)])
     assert gain.share_beyond_road < 0.02 and patch.share_beyond_road < 0.02 < 0.2 < damping.share_beyond_road
