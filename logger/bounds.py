@@ -24,6 +24,8 @@ MOST_SAMPLES = 10_000_000
 """28 hours at 100 Hz, 500 km of road at 0.05 m: 80 MB a column, so that a desk command stays below half a gigabyte."""
 MOVING_MPS = 3.0
 """A car that is faster drives, whatever its receiver errs by."""
+BACK_M = 1.0
+"""A distance may go back so far, as one that is corrected by GPS does."""
 DISCREPANCY = 0.003
 """Share of the signal in a band by which two right simulations of one car may differ. They differ most where a car has
 dry friction, whose force is delayed by part of a step. A judgement: with 1 %, searches called right models unexplained.

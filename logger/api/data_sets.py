@@ -29,13 +29,13 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from logger.api.csv_recording import CsvSettings, extract_csv
-from logger.api.drives import Run, assessed, read_run, sensor_of
+from logger.api.drives import assessed, sensor_of
 from logger.api.extraction import read_measured_profile
+from logger.api.inputs import Model, Run, read_run, read_vehicle
 from logger.api.lab.bench import bench_with
 from logger.api.lab.compare import AddedEffect, add_effect
 from logger.api.lab.diagnose import Diagnosis, diagnose
 from logger.api.lab.question import CompareQuestion
-from logger.api.vehicles import Model, read_vehicle
 from logger.chart_data import Array, Curves, Line, line
 from logger.errors import BadInput
 from logger.extraction.along_track import MeasuredLine, passes

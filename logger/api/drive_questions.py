@@ -269,7 +269,7 @@ class ModesQuestion(Question):
 
 
 COMFORT = Verb(ComfortQuestion, "logger.api.rides:comfort", (PICTURES,))
-CALIBRATE = Verb(CalibrateQuestion, "logger.api.vehicles:calibrate", (
+CALIBRATE = Verb(CalibrateQuestion, "logger.api.calibration:calibrate", (
     Out("write the figures of each speed as CSV", metavar="FILE", others=("*",), many=False, is_drawn=False),))
 ESTIMATE = Verb(EstimateQuestion, "logger.api.drives:estimate", (
     Out("write the windows as CSV; FILE.html, .png, .svg or .pdf: pictures; may repeat", metavar="FILE", others=("*",)),

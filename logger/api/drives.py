@@ -1,9 +1,8 @@
-"""Drives: recorded and simulated ones as runs, and the roughness of the road as a drive shows it."""
+"""Drives: simulated ones, and the roughness of the road as a drive shows it."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from inspect import getdoc
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -12,12 +11,10 @@ import numpy.typing as npt
 
 from logger import bounds
 from logger.api.drive_questions import EstimateQuestion, SimulateQuestion
-from logger.api.roads import Profile, read_profile, write_profile
+from logger.api.inputs import Profile, Run, car_on, check_forces, checked_run, model_of, read_profile, write_profile
 from logger.api.shared_fields import named_numbers
-from logger.api.shown import CommandResult, Shown, checks_json, checks_lines, table
-from logger.api.vehicles import car_on, check_forces, model_of
-from logger.chart_data import Array, Chart, Curves, Line, line
-from logger.dsp.channel_faults import released_at
+from logger.api.shown import CommandResult, checks_json, checks_lines
+from logger.chart_data import Array, Chart, Curves, Line
 from logger.errors import BadInput, as_bad_input
 from logger.estimation.batch import (
     RESOLVED_SHARE,
@@ -31,21 +28,20 @@ from logger.estimation.batch import (
 )
 from logger.estimation.rms_calibration import LEVELS_IRI
 from logger.estimation.sensor_noise import NOISE_MPS2, Sensor
-from logger.files import make_folder, together, write_text
+from logger.files import write_text
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.question import Notify, function, silent
 from logger.report.blocks import Block, Blocks, Hint, Lines, Table
 from logger.report.quantities import known, numbers_of
 from logger.roads.iri import doubt_of
-from logger.runs import SKIP_S, SLOWEST_MPS, UNKNOWN, Past, past_of
+from logger.runs import SKIP_S, SLOWEST_MPS
 from logger.runs import Run as Record
 from logger.simulation import virtual_drive
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats import drive_file, profile_file, vehicle_file
-from logger.store.formats.drive_file import facts_beside, write_run_facts
 from logger.store.formats.effect_file import effect_named
-from logger.store.formats.record_checks import EvenRecord, RecordRules, even_columns
+from logger.store.formats.record_checks import RecordRules
 from logger.store.formats.vehicle_file import CarModel, check_moves_itself
 from logger.vehicle.compose import Car, with_effect
 from logger.vehicle.effect import Chosen, chosen
@@ -53,170 +49,6 @@ from logger.vehicle.named_parameters import WEAKEST
 from logger.vehicle.structure import Output, Structure, body_point, suspension_travel, tire_deflection, wheel
 from logger.vehicle.uncertain import sized
 from logger.vehicle.vehicle import Vehicle
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Run(drive_file.Drive, Shown):
-    __doc__ = f"""{getdoc(drive_file.Drive)}
-profile        the road that was driven; None: not known
-excitation     what moved the wheels of a rig, counted from the first sample; None: it is no rig
-"""
-
-    profile: Profile | None = None
-    excitation: Excitation | None = None
-
-    def __repr__(self) -> str:
-        return table(f"Run {self.path}", [
-            ("time", len(self.time_s) / self.rate_hz, "s"), ("samples", len(self.time_s), ""),
-            ("rate", self.rate_hz, "Hz"),
-            ("distance", None if self.excitation else
-             f"{self.distance_m.min():.4g} to {self.distance_m.max():.4g}", "m"),
-            ("mean speed", None if self.excitation else float(self.speed_mps.mean()), "m/s"),
-            ("acceleration, r.m.s.", float(np.sqrt(np.mean(self.accel_z_mps2**2))), "m/s2"),
-            ("profile", None if self.profile is None else
-             f"{self.profile.start_m:.4g} to {self.profile.distance_m[-1]:.4g}", "m"),
-            ("excitation", None if self.excitation is None else
-             f"{self.excitation.start_s:.4g} to {self.excitation.end_s:.4g}", "s")])
-
-    def charts(self) -> Sequence[Chart]:
-        """The acceleration over time."""
-        return [Curves("Run", "time [s]", "acceleration [m/s2]", (line("sensor", self.time_s, self.accel_z_mps2),))]
-
-    @property
-    def track(self) -> Track | Excitation | None:
-        """The road, or the excitation, as models read it."""
-        if self.excitation is not None:
-            return self.excitation
-        return None if self.profile is None else drive_file.track_of(self.profile)
-
-
-def read_run(path: Path | str) -> Run:
-    """Read a folder with ``drive.csv`` and ``profile.csv`` (where the road is known) or, for a rig, ``excitation.csv``;
-    or a ``drive.csv`` alone.
-
-    Raises BadInput (``file:line: expected ..., found ...``) for a file that is missing or not what it should be.
-
-    >>> read_run(folder).accel_z_mps2.shape
-    (1115,)
-    """
-    place = Path(path)
-    timed = place.is_dir() and drive_file.driven_by_time(place)
-    drive = drive_file.drive_in(place, timed) if place.is_dir() else drive_file.read_drive(place)
-    return Run(**vars(drive), profile=_profile_beside(place),
-               excitation=drive_file.excitation_beside(drive) if timed else None)
-
-
-def run_on_road(given: Run | Path | str, notify: Notify = silent) -> Run:
-    """A run, or its folder, with the road that it was driven on, or its excitation; a free decay from where it is let
-    go. BadInput for one without."""
-    if not isinstance(given, Run) and not Path(given).is_dir():
-        raise BadInput(f"{given}: expected a folder with {drive_file.DRIVE} and {drive_file.PROFILE} (or "
-                       f"{drive_file.EXCITATION})")
-    run = given if isinstance(given, Run) else read_run(given)
-    if run.track is None:
-        raise BadInput(f"{run.path}: expected a run with the profile that it was driven on, or its excitation "
-                       f"({drive_file.PROFILE} or {drive_file.EXCITATION})")
-    return _let_go(run, notify) if past_of(run.track) is Past.FREE else run
-
-
-def _let_go(run: Run, notify: Notify) -> Run:
-    """A free decay without the time in which it was held still before."""
-    first = released_at(run.accel_z_mps2)
-    if not first:
-        return run
-    later_s = first / run.rate_hz
-    notify(f"{run.path}: held still for its first {later_s:.3g} s, which are left out")
-    columns: dict[str, Any] = {name: one[first:] for name, one in vars(run).items() if isinstance(one, np.ndarray)}
-    return replace(run, **columns, more={name: one[first:] for name, one in run.more.items()},
-                   excitation=run.excitation and run.excitation.begun(later_s))
-
-
-def _file_of(place: Path) -> Path:
-    return place / drive_file.DRIVE if place.is_dir() else place
-
-
-def _profile_beside(place: Path) -> Profile | None:
-    profile = place / drive_file.PROFILE
-    return read_profile(profile) if place.is_dir() and profile.exists() else None
-
-
-def checked_run(run: drive_file.Drive | Path | str, asked: RecordRules) -> tuple[Run, EvenRecord]:
-    """A run, or its file, judged and, where that was ``asked`` for, mended; and what was found.
-
-    Raises BadInput as ``read_run``, and for what would give a wrong result.
-    """
-    if isinstance(run, drive_file.Drive):
-        run = run if isinstance(run, Run) else Run(**vars(run))
-        names = (*drive_file.COLUMNS, *drive_file.PLACE, drive_file.USABLE)
-        arrays = (run.time_s, run.accel_z_mps2, run.speed_mps, run.distance_m, run.lat_deg, run.lon_deg, run.usable)
-        columns = {name: one for name, one in zip(names, arrays, strict=True) if one is not None}
-        place, profile, file = run.path, run.profile, str(_file_of(run.path))
-    else:
-        place = Path(run)
-        (file, columns), profile = drive_file.read_columns(_file_of(place)), _profile_beside(place)
-    found = even_columns(columns, file, asked)
-    if found.resampled is None and asked.unit is None and isinstance(run, Run):
-        return run, found
-    even = {drive_file.TIME: np.array([found.start_s]), **found.accel_mps2, **found.others}
-    drive = drive_file.drive_of(place, found.rate_hz, even)
-    # What was laid on other times, or written in another unit, is on none of the steps that its facts say.
-    as_written = found.resampled is None and asked.unit is None
-    facts = facts_beside(place) if as_written else UNKNOWN
-    return Run(**{**vars(drive), "facts": facts}, profile=profile), found
-
-
-def write_run(folder: Path | str, run: Run) -> None:
-    """Write a run as a folder with ``drive.csv`` (ten digits) and what else is known: ``profile.csv`` or, for a rig,
-    ``excitation.csv``; and ``run.yaml``. OSError if that fails.
-
-    >>> write_run(folder / "again", read_run(folder))
-    """
-    place = Path(folder)
-    columns = {"t_s": run.time_s, run.facts.main.name: run.accel_z_mps2, "speed_mps": run.speed_mps,
-               "distance_m": run.distance_m, "lat_deg": run.lat_deg, "lon_deg": run.lon_deg, "usable": run.usable,
-               **run.more}
-    away = (drive_file.SPEED, drive_file.DISTANCE) if run.excitation is not None else ()
-    with together():
-        make_folder(place)
-        drive_file.write_drive(place / drive_file.DRIVE, {name: one for name, one in columns.items()
-                                                          if one is not None and name not in away})
-        forces = () if run.excitation is None else run.excitation.forces
-        if run.facts != UNKNOWN or forces:
-            write_run_facts(place, run.facts, forces)
-        if run.excitation is not None:
-            on_its_clock = run.excitation.begun(-float(run.time_s[0]))
-            drive_file.write_excitation(place / drive_file.EXCITATION, on_its_clock)
-        if run.profile is not None:
-            write_profile(place / drive_file.PROFILE, run.profile)
-
-
-def make_run(
-    accel_z_mps2: npt.ArrayLike, speed_mps: npt.ArrayLike, *, rate_hz: float, distance_m: npt.ArrayLike | None = None,
-    profile: Profile | None = None, name: str = "run",
-) -> Run:
-    """A run from arrays (n,); the first sample is at 0 s.
-
-    accel_z_mps2   of the sensor, up positive, gravity removed [m/s2]
-    speed_mps      (n,), or one for all samples [m/s]
-    distance_m     where the front tires stand on the profile [m]; None: the integral of the speed, from 0 on
-    name           other runs beside it need others
-
-    Raises BadInput for arrays of different lengths, values that are not finite, or fewer than two samples.
-
-    >>> run = make_run([0.0] * 500, 10.0, rate_hz=100.0)
-    >>> round(float(run.distance_m[-1]), 6)
-    49.9
-    """
-    accel = np.asarray(accel_z_mps2, dtype=np.float64)
-    speed = np.broadcast_to(np.asarray(speed_mps, dtype=np.float64), accel.shape)
-    driven = np.concatenate([[0.0], np.cumsum(0.5 * (speed[1:] + speed[:-1])) / rate_hz])
-    distance = driven if distance_m is None else np.asarray(distance_m, dtype=np.float64)
-    if not accel.ndim == 1 < len(accel) == len(distance) or not rate_hz > 0:
-        raise BadInput(f"{name}: expected arrays of one length, two samples or more, and a rate above 0 Hz")
-    if not all(np.isfinite(one).all() for one in (accel, speed, distance)):
-        raise BadInput(f"{name}: expected finite values")
-    return Run(Path(name), rate_hz, np.arange(len(accel)) / rate_hz, accel, speed, distance, None, None, profile)
-
 
 # --- the road as a drive shows it ---
 

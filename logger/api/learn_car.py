@@ -11,9 +11,9 @@ import numpy as np
 from logger.api.csv_recording import CsvSettings, recorded_csv
 from logger.api.drive_questions import LearnCarQuestion
 from logger.api.extraction import even_drives, recorded_dump
+from logger.api.inputs import Model, read_vehicle
 from logger.api.shared_fields import each
 from logger.api.shown import CommandResult
-from logger.api.vehicles import Model, read_vehicle
 from logger.bounds import CONFLICT_SIGMA, UNUSUAL_SIGMA
 from logger.chart_data import Chart, Curves, Line
 from logger.errors import BadInput, CheckFailed, as_bad_input

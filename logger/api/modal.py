@@ -16,9 +16,8 @@ import numpy as np
 import numpy.typing as npt
 
 from logger.api.drive_questions import ModesQuestion
-from logger.api.drives import read_run
+from logger.api.inputs import Model, model_of, read_run
 from logger.api.shown import CommandResult, Shown, table
-from logger.api.vehicles import Model, model_of
 from logger.arrays import Bools, Complex
 from logger.chart_data import Array, Chart, Curves, Line, line
 from logger.errors import BadInput, as_bad_input

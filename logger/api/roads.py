@@ -1,4 +1,4 @@
-"""Roads: measured profiles and random ones, their IRI and their class (ISO 8608), each with its words and JSON."""
+"""Roads: the IRI and the class (ISO 8608) of measured ones, and random ones, each with its words and JSON."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -8,7 +8,8 @@ from typing import Any, ClassVar
 import numpy as np
 
 from logger.api.drive_questions import ClassifyQuestion, IriQuestion, RandomRoadQuestion
-from logger.api.shown import CommandResult, Shown, table
+from logger.api.inputs import Profile
+from logger.api.shown import CommandResult
 from logger.chart_data import Array, Chart, Curves, Line, line
 from logger.errors import BadInput
 from logger.question import function
@@ -30,64 +31,8 @@ from logger.roads.iri import (
 )
 from logger.roads.iso8608 import CLASS_GD_N0_CM3, displacement_psd, generate, iri_from_gd_n0
 from logger.roads.sections import ride_words, road_kinds
-from logger.store.formats import drive_file, profile_file
+from logger.store.formats import profile_file
 from logger.units import FOOT_M, INCH_PER_MILE_M_PER_KM, WINDOW_M
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Profile(profile_file.Wheelpaths, Shown):
-    """The elevations of a road under one or two wheelpaths.
-
-    start_m              distance of the first sample [m]
-    spacing_m            between samples [m]
-    elevation_m          (n,) of the left track, or of the only one [m]
-    elevation_right_m    (n,) of the right one [m], or None
-    widest_step_m        for one that was resampled: the widest hole that a straight line was laid across [m]
-    """
-
-    @property
-    def distance_m(self) -> Array:
-        """(n,) where the samples lie [m]."""
-        return self.start_m + self.spacing_m * np.arange(len(self.elevation_m), dtype=np.float64)
-
-    def __repr__(self) -> str:
-        return table("Profile", [
-            ("length", self.spacing_m * (len(self.elevation_m) - 1), "m"), ("begins at", self.start_m, "m"),
-            ("spacing", self.spacing_m, "m"), ("samples", len(self.elevation_m), ""),
-            ("wheelpaths", 1 if self.elevation_right_m is None else 2, ""),
-            ("elevation, standard deviation", float(self.elevation_m.std()), "m"),
-            ("resampled across", self.widest_step_m, "m")])
-
-    def charts(self) -> Sequence[Chart]:
-        """The elevation of each track."""
-        right = self.elevation_right_m
-        tracks = {"elevation" if right is None else "left": self.elevation_m, "right": right}
-        return [Curves("Profile", "distance [m]", "elevation [m]", tuple(
-            line(name, self.distance_m, track) for name, track in tracks.items() if track is not None))]
-
-
-def read_profile(path: Path | str, resample_m: float | None = None) -> Profile:
-    """Read a road profile.
-
-    path          CSV ``distance_m,elevation_m[,elevation_right_m]``, or ERD (recognised by its first line)
-    resample_m    for one that is unevenly spaced: lay straight lines between its samples, and take one every so many
-                  metres [m]
-
-    Raises BadInput (``file:line: expected ...``) for anything else, and for distances that are not evenly spaced.
-
-    >>> road = read_profile(folder / "profile.csv")
-    >>> road.elevation_m.shape, road.spacing_m
-    ((2001,), 0.1)
-    """
-    return Profile(**vars(profile_file.read_profile(path, resample_m, judged=True)))
-
-
-def write_profile(path: Path | str, profile: Profile) -> None:
-    """Write a profile as CSV, to a tenth of a micrometre. OSError if that fails.
-
-    >>> write_profile(folder / "smooth.csv", random_road(iso_class="A", length_m=50.0))
-    """
-    drive_file.write_profile(Path(path), drive_file.track_of(profile))
 
 
 @function(RandomRoadQuestion)

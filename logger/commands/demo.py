@@ -101,9 +101,9 @@ def car(out: Path, unpack_only: bool, as_json: bool) -> None:
     """Write drives of a car that nobody measured into ``out``, and learn it as ``ridelog learn-car`` does."""
     import numpy as np
 
-    from logger.api.drives import simulate, write_run
+    from logger.api.drives import simulate
+    from logger.api.inputs import read_vehicle, write_run
     from logger.api.roads import random_road
-    from logger.api.vehicles import read_vehicle
     from logger.vehicle.published_cars import NUMBERS, coordinates_of
 
     given = read_vehicle(CAR.vehicle)
@@ -364,7 +364,8 @@ def _story(commands: _Commands, out: Path, tell: Say) -> Story:
 
 def _judged(folder: Path, vehicle: str, title: str, why: str, commands: _Commands, tell: Say) -> Assessment:
     """The road of a drive, read in the steps that its record says, as ``ridelog estimate`` finds it."""
-    from logger.api.drives import as_json, assessed, blocks, checked_run, sensor_of
+    from logger.api.drives import as_json, assessed, blocks, sensor_of
+    from logger.api.inputs import checked_run
     from logger.report.blocks import Hint, Lines, Table, text
     from logger.shipped import vehicle_path
     from logger.store.formats.record_checks import RecordRules

@@ -28,7 +28,7 @@ from typing import Any
 import numpy as np
 
 from logger.arrays import ROUNDING, Array, Bools
-from logger.bounds import EVEN_SAMPLES, time_hint
+from logger.bounds import BACK_M, EVEN_SAMPLES, time_hint
 from logger.dsp.weightings.weighting import LOWEST_RATE_HZ
 from logger.estimation.car_response import SPEEDS_PER_E
 from logger.estimation.error_bound import ErrorBound, pooled_r2
@@ -53,8 +53,6 @@ _SMOOTHED_S = 2.0
 _FINEST_RATIO = 2000
 RESOLVED_SHARE = 0.75
 _ORDER = 8
-BACK_M = 1.0
-"""A distance may go back so far, as one that is corrected by GPS does."""
 SPEED_CLASS_MPS = 5.0
 _WAYS_DIFFER = 0.1
 _LEAST_WAY_M = 10.0  # over less, a distance from GPS may well differ from the integral of the speed

@@ -16,9 +16,12 @@ from typing import Any
 
 _HOMES = {
     "logger.api.conversion": "Conversion convert",
-    "logger.api.drives": "Estimate Run estimate make_run read_run simulate write_run",
+    "logger.api.calibration": "Calibration Slopes calibrate",
+    "logger.api.drives": "Estimate estimate simulate",
     "logger.api.fleet": "FleetReport FleetSummary Ingested fleet_ingest fleet_report fleet_summarise",
     "logger.api.identify.answer": "Identification identify",
+    "logger.api.inputs": "EffectInfo Effects Model Profile Run make_run read_profile read_run read_vehicle vehicles "
+                         "write_profile write_run write_vehicle",
     "logger.api.lab.compare": "AddedEffect Comparison ShiftedNumber add_effect compare",
     "logger.api.lab.loop": "LabStory lab",
     "logger.api.lab.learn": "LearnedLaw learn",
@@ -27,10 +30,9 @@ _HOMES = {
     "logger.api.passes": "RepeatedDrives passes",
     "logger.api.lab.plan": "NextDrive Plan plan",
     "logger.api.rides": "Comfort Record comfort read_record",
-    "logger.api.roads": "Iri Profile RoadClass classify iri random_road read_profile write_profile",
+    "logger.api.roads": "Iri RoadClass classify iri random_road",
     "logger.api.lab.diagnose": "Candidate Diagnosis diagnose",
     "logger.api.sections": "Sections sections",
-    "logger.api.vehicles": "Calibration EffectInfo Effects Model Slopes calibrate read_vehicle vehicles write_vehicle",
     "logger.errors": "BadInput",
     "logger.identification.identifiability": "NotIdentifiable",
 }

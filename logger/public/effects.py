@@ -55,7 +55,7 @@ class _ListsEffects(ModuleType):
     """Python keeps this module as ``ridelog.effects``, where the function of that name would be."""
 
     def __call__(self) -> object:
-        from logger.api.vehicles import effects
+        from logger.api.inputs import effects
 
         return effects()
 

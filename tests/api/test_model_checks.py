@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from logger.api.drives import run_on_road as read_run
+from logger.api.inputs import run_on_road as read_run
 from logger.api.lab.bench import known_effects, silent
 from logger.api.lab.checks import check_model, checked_runs, predicted
 from logger.commands.main import main

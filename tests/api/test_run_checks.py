@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from logger.api.drives import Run, profile_of
+from logger.api.drives import profile_of
+from logger.api.inputs import Run
 from logger.api.lab.checks import driven_stretches, thinned_runs, unexplained_up_to_hz
 from logger.errors import BadInput
 from logger.profiles.excitation import AppliedForce, Excitation

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from logger.api.drives import run_on_road as read_run
+from logger.api.inputs import run_on_road as read_run
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.store.formats.effect_file import shipped_effects

@@ -9,7 +9,7 @@ from subprocess import CompletedProcess
 import numpy as np
 import pytest
 
-from logger.api.drives import run_on_road as read_run
+from logger.api.inputs import run_on_road as read_run
 from logger.commands import demo
 
 from ..support.command import called

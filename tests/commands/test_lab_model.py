@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from logger.api.drives import run_on_road as read_run
+from logger.api.inputs import run_on_road as read_run
 from logger.api.lab.bench import sought_effects
 from logger.api.lab.checks import checked_runs
 from logger.api.shown import check_out

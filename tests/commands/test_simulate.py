@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from logger.api.drives import Run
-from logger.api.drives import run_on_road as read_run
+from logger.api.inputs import Run
+from logger.api.inputs import run_on_road as read_run
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.profiles.track import Track

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import yaml
 
-from logger.api.drives import run_on_road as read_run
+from logger.api.inputs import run_on_road as read_run
 from logger.commands.main import main
 from logger.errors import BadInput
 from logger.profiles.track import Track

@@ -9,7 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from logger.api.drives import Run, profile_of
+from logger.api.drives import profile_of
+from logger.api.inputs import Run
 from logger.api.lab.checks import driven_stretches
 from logger.commands.main import main
 from logger.left_out import LeftOut, counting, left_out_json, left_out_lines

@@ -19,7 +19,7 @@ from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
-from logger.api.drives import run_on_road as read_run
+from logger.api.inputs import run_on_road as read_run
 from logger.api.lab.bench import known_effects, silent
 from logger.api.lab.checks import check_model, checked_runs
 from logger.errors import BadInput

@@ -13,8 +13,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from logger.api.drives import Run, read_run, run_on_road
 from logger.api.identify.question import MEASURED, OBSTACLES, SAME, IdentifyQuestion
+from logger.api.inputs import Model, Run, check_forces, model_of, read_run, run_on_road
 from logger.api.lab.bench import slow_words, word_of
 from logger.api.lab.checks import (
     check_channels,
@@ -27,7 +27,6 @@ from logger.api.lab.checks import (
 )
 from logger.api.shared_fields import each, paths_of
 from logger.api.shown import CommandResult
-from logger.api.vehicles import Model, check_forces, model_of
 from logger.bounds import UNUSUAL_SIGMA
 from logger.chart_data import Array, Bars, Chart, Curves, Line
 from logger.dsp.filters import DecimatingLowPass

@@ -15,12 +15,11 @@ from typing import Any
 
 import numpy as np
 
-from logger.api.drives import Run as DrivenRun
-from logger.api.drives import run_on_road
+from logger.api.inputs import Run as DrivenRun
+from logger.api.inputs import model_of, run_on_road
 from logger.api.lab.checks import check_model, check_moves, checked_runs, predicted, with_initial_values
 from logger.api.lab.question import LabQuestion
 from logger.api.shared_fields import Runs, each
-from logger.api.vehicles import model_of
 from logger.arrays import Array
 from logger.errors import BadInput, as_bad_input
 from logger.lab.compare import LabComparison, compare

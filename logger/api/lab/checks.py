@@ -12,14 +12,13 @@ from statistics import median
 
 import numpy as np
 
-from logger.api.vehicles import check_forces
+from logger.api.inputs import check_forces
 from logger.arrays import Array, Bools
-from logger.bounds import QUIETEST_MPS2, SPEED, time_hint
+from logger.bounds import BACK_M, QUIETEST_MPS2, SPEED, time_hint
 from logger.dsp.channel_faults import at_ends, goes_against, longest_still
 from logger.dsp.repeated_samples import find_repeats, stretches_of
 from logger.dsp.whole_record import thinned
 from logger.errors import BadInput, as_bad_input
-from logger.estimation.batch import BACK_M
 from logger.identification.noise_models import DOUBT
 from logger.identification.time_scale import at_time_scale
 from logger.lab.another_car import LikeliestRig, another_car, error_with_best_effect, likeliest_rig

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
+from logger.api.inputs import Model, model_of
 from logger.api.lab import words as lab_words
 from logger.api.lab.bench import Bench, bench_with, slow_words
 from logger.api.lab.question import AddEffectQuestion, CompareQuestion, LabQuestion
 from logger.api.shared_fields import named_numbers
 from logger.api.shown import CommandResult
-from logger.api.vehicles import Model, model_of
 from logger.bounds import SURE_SIGMA
 from logger.chart_data import Array, Chart, Curves, Line, line
 from logger.errors import BadInput

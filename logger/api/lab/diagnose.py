@@ -11,14 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from logger.api.drives import Run
+from logger.api.inputs import Model, Run, model_of
 from logger.api.lab import words as lab_words
 from logger.api.lab.bench import Bench, among, bench_with, known_effects, tolerance_of, with_candidates, word_of
 from logger.api.lab.checks import check_distances, check_record, driven_parts, thinned_runs
 from logger.api.lab.compare import forces_section, spectra
 from logger.api.lab.question import DiagnoseQuestion
 from logger.api.shared_fields import each
-from logger.api.vehicles import Model, model_of
 from logger.chart_data import Array, Bars, Curves, Line
 from logger.errors import BadInput
 from logger.extraction.along_track import MeasuredLine

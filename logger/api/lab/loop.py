@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from logger.api.inputs import Model, model_of, read_vehicle
 from logger.api.lab import compare as comparing
 from logger.api.lab import diagnose as diagnosing
 from logger.api.lab import learn as learning
@@ -18,7 +19,6 @@ from logger.api.lab.bench import Bench, bench_with, with_candidates
 from logger.api.lab.question import LabLoopQuestion
 from logger.api.lab.words import MODEL_BY_MODEL, ModelByModel, falling, steps_json, steps_section
 from logger.api.shown import check_out
-from logger.api.vehicles import Model, model_of, read_vehicle
 from logger.chart_data import Array, Curves, Line
 from logger.errors import BadInput
 from logger.estimation.batch import Assessment, figures

@@ -11,13 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from logger.api.inputs import model_of, read_profile
 from logger.api.lab.bench import Bench, among, bench_with, planned_bench, tolerance_of, word_of
 from logger.api.lab.question import PlanQuestion
 from logger.api.lab.words import not_tried
-from logger.api.roads import read_profile
 from logger.api.shared_fields import each
 from logger.api.shown import CommandResult
-from logger.api.vehicles import model_of
 from logger.chart_data import Array
 from logger.errors import BadInput
 from logger.estimation.sensor_noise import NOISE_MPS2

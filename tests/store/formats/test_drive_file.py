@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from logger.api.drives import run_on_road as read_run
+from logger.api.inputs import run_on_road as read_run
 from logger.errors import BadInput
 from logger.profiles.track import Track
 from logger.store.formats.drive_file import read_speeds, write_drive, write_profile

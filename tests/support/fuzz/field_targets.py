@@ -18,7 +18,7 @@ import numpy as np
 
 from logger.api.csv_recording import CsvSettings, recorded_csv
 from logger.api.datasets.lira_map import ProfilerPass
-from logger.api.drives import run_on_road as read_run
+from logger.api.inputs import run_on_road as read_run
 from logger.errors import BadInput
 from logger.files import json_sha256
 from logger.fleet.dataset import Dataset

@@ -21,7 +21,7 @@ from pathlib import Path
 from drivers.dump import DumpHeader, Event, open_dump
 from drivers.errors import DriverError
 from drivers.wire_profiles import load_profile
-from logger.api.drives import run_on_road as read_run
+from logger.api.inputs import run_on_road as read_run
 from logger.errors import BadInput
 from logger.service.config import load_config
 from logger.store.formats.profile_file import read_profile

@@ -26,7 +26,7 @@ from drivers.accelerometers.pasco import PascoDecoder
 from drivers.dump import open_dump
 from drivers.nmea import NmeaDecoder
 from drivers.wire_profiles import FrameLayout, LineLayout, WireProfile, load_profile, shipped_profiles
-from logger.api.drives import run_on_road as read_run
+from logger.api.inputs import run_on_road as read_run
 from logger.errors import BadInput
 from logger.records import WindowRecord
 from logger.service.config import load_config
