@@ -98,10 +98,12 @@ class BySquares:
         loudest = max(self.kept, key=lambda one: float(self.whole.runs.runs[one].kept_mps2.std()))
         return self if len(self.kept) == 1 else BySquares(self.whole, [loudest])
 
-    def improved(self, start: State, rounds: int = ROUNDS, to_reach: float = np.inf) -> tuple[float, State]:
+    def improved(self, start: State, rounds: int = ROUNDS, to_reach: float = np.inf, min_share: float = 0.0
+                 ) -> tuple[float, State]:
         """A state improved in so many rounds of steps, and its deviance; as long as those that are left may reach a
-        deviance at the pace of the last."""
-        least, best = self.deviance(start), start
+        deviance at the pace of the last, and a round gains such a share of the whole gain."""
+        least = first = self.deviance(start)
+        best = start
         for left in reversed(range(rounds)):
             try:
                 with np.errstate(all="ignore"):
@@ -114,7 +116,8 @@ class BySquares:
                 break
             if not deviance < least:
                 break
-            enough = least - deviance < max(CONVERGED, (deviance - to_reach) / max(left, 1))
+            enough = least - deviance < max(CONVERGED, (deviance - to_reach) / max(left, 1),
+                                            min_share * (first - deviance))
             least, best = deviance, found
             if enough:
                 break

