@@ -118,13 +118,15 @@ class UnknownNumbers(MeasuredRoad):
             refined = [each for each in first if each not in plain]
             ends = _improved(pool, by_squares, plain, least)
             if ends and ends[0][0] < least:
-                ends += _improved(pool, by_squares, refined, _explaining_most(by_squares, ends))
+                ends += _improved(pool, by_squares, refined, _explaining_most(by_squares, _plain(ends)))
                 ends.sort(key=_by_deviance)
                 refined = []
             if near is not None and one.effect is near.effect and ends and ends[0][0] > known - INDISTINGUISHABLE:
                 continue
+            # What leaves far more than the effect in whose place it is tried is fitted from its trial alone.
+            worth = ends and _explaining_most(by_squares, ends[0][0]) < known
             found.append(Started(one.effect, one.trials, [*refined, *others], ends, without - ends[0][0])
-                         if ends else one)
+                         if worth else one)
             if ends and ends[0][0] < least and not is_outside_data(base.posterior, ends[0][1].effects[-1]):
                 least, best = ends[0]
                 numbers = best.logs if self._shows_the_car(by_squares, anchor, best) else None
@@ -156,13 +158,13 @@ class UnknownNumbers(MeasuredRoad):
         ends = [*one.ends]
         for other in one.others:
             alike = [deviance for deviance, end in ends if end.effects[-1].is_plain is _is_plain(other)]
-            needed = np.inf if _is_plain(other) else _explaining_most(by_squares, ends)
+            needed = np.inf if _is_plain(other) else _explaining_most(by_squares, _plain(ends))
             if len(alike) < 2 or (alike[1] > alike[0] + INDISTINGUISHABLE and alike[0] < needed):
                 ends.append(by_squares.improved(other[1], to_reach=min([needed, *alike])))
                 ends.sort(key=_by_deviance)
         self._keep(ends)
         trials = {trial.one.is_plain: trial for trial in reversed(one.trials)}
-        needed = _explaining_most(by_squares, ends)
+        needed = _explaining_most(by_squares, _plain(ends))
         best = {_is_plain(end): end[1] for end in reversed(ends) if _is_plain(end) or end[0] < needed}
         found = fit_roughly(score, base, replace(one, trials=tuple(trials.values())))
         found += [CandidateFit.of(score, self._likeliest(by_squares.of_all(state, base.state), base.posterior))
@@ -301,10 +303,14 @@ def _is_plain(one: _Drawn) -> bool:
     return one[1].effects[-1].is_plain
 
 
-def _explaining_most(by_squares: BySquares, ends: Sequence[_Drawn]) -> float:
-    """The deviance of a car that explains most of what the best one leaves whose last effect has its plain form."""
-    plain = (end[0] for end in ends if _is_plain(end))
-    return min(plain, default=np.inf) + by_squares.posterior.freedom * float(np.log(most_of(1.0)))
+def _plain(ends: Sequence[_Drawn]) -> float:
+    """The least deviance of cars whose last effect has its plain form."""
+    return min((end[0] for end in ends if _is_plain(end)), default=np.inf)
+
+
+def _explaining_most(by_squares: BySquares, deviance: float) -> float:
+    """The deviance of a car that explains most of what one with a deviance leaves."""
+    return deviance + by_squares.posterior.freedom * float(np.log(most_of(1.0)))
 
 
 def _improved(pool: ThreadPoolExecutor, by_squares: BySquares, begun: Sequence[_Drawn], to_reach: float
