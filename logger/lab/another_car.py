@@ -179,4 +179,4 @@ def error_with_best_effect(runs: SimulatedRuns, vehicle: Vehicle, present: Seque
     search: Search[Baseline, Screened, CandidateFit] = Search(tried, len(present), misalignment(posterior, start))
     nominal = align(posterior, start).with_number_slopes(posterior.number_slopes(start, posterior.prior.steps))
     fits = search.round(Baseline.of(nominal), tried).fits
-    return min((posterior.error(one.found.state) for one in fits), default=np.inf)
+    return min((posterior.error(one.state) for one in fits), default=np.inf)

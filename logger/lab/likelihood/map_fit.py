@@ -45,30 +45,6 @@ _NEAR_M = 0.02
 pace."""
 
 
-@dataclass(frozen=True, eq=False)
-class MapFit:
-    """A fitted model without its linearisation, which takes much memory.
-
-    state      the fitted numbers and their predictions
-    numbers    derivatives by the car's numbers (p, n) per run, taken near the state
-    score      minus twice the log of its evidence
-    """
-
-    posterior: Posterior
-    state: State
-    numbers: list[Array]
-    score: float
-
-    @staticmethod
-    def of(linear: LinearModel) -> "MapFit":
-        """The fitted model that a linear model was linearised at."""
-        return MapFit(linear.posterior, linear.state, list(linear.numbers or ()), linear.score)
-
-    def linearise(self) -> LinearModel:
-        """The model linearised again at its state."""
-        return LinearModel(self.posterior, self.state, self.numbers)
-
-
 def fit(start: LinearModel, numbers: Sequence[Array] | None = None, rounds: int = 6, min_gain: float = 0.0,
         at_most: int = 0) -> LinearModel:
     """A model fitted in full, linearised at its maximum.

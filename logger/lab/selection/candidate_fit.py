@@ -10,11 +10,12 @@ from math import prod
 
 import numpy as np
 
+from logger.arrays import Array
 from logger.lab.likelihood.by_squares import BySquares
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import MapFit, fit, optimise_numbers, relinearise
+from logger.lab.likelihood.map_fit import fit, optimise_numbers, relinearise
 from logger.lab.likelihood.noise_floor import gain_of_full_explanation
-from logger.lab.likelihood.posterior import NotSimulated, State
+from logger.lab.likelihood.posterior import NotSimulated, Posterior, State
 from logger.lab.selection.evidence import (
     INDISTINGUISHABLE,
     min_gain,
@@ -29,19 +30,29 @@ from logger.vehicle.named_parameters import free_parameters_of
 
 @dataclass(frozen=True, eq=False)
 class CandidateFit:
-    """A model with one more effect, its last.
+    """A fitted model with one more effect, its last, without its linearisation, which takes much memory.
 
-    gain    by how much its score is below that of the model without it
+    state      the fitted numbers and their predictions
+    numbers    derivatives by the car's numbers (p, n) per run, taken near the state
+    score      minus twice the log of its evidence
+    gain       by how much this is below the score of the model without the effect
     """
 
-    found: MapFit
+    posterior: Posterior
+    state: State
+    numbers: list[Array]
+    score: float
     gain: float
 
     @staticmethod
     def of(score: float, fitted: LinearModel) -> CandidateFit:
         """A fitted model, over one with this score."""
-        found = MapFit.of(fitted)
-        return CandidateFit(found, score - found.score)
+        return CandidateFit(fitted.posterior, fitted.state, list(fitted.numbers or ()), fitted.score,
+                            score - fitted.score)
+
+    def further(self, rounds: int = 6, least: float = 0.0) -> LinearModel:
+        """The model fitted from there on, in so many rounds at most, until one gains less than this."""
+        return fit(LinearModel(self.posterior, self.state, self.numbers), self.numbers, rounds, min_gain=least)
 
     @property
     def effect(self) -> Effect:
@@ -51,12 +62,12 @@ class CandidateFit:
     @property
     def chosen(self) -> Chosen:
         """The effect that was added, with its values."""
-        return self.found.state.effects[-1]
+        return self.state.effects[-1]
 
     @cached_property
     def hold_out(self) -> HoldOut:
         """Cross-validation of the model."""
-        return cross_validate(self.found)
+        return cross_validate(self)
 
 
 def chance_of(effects: Sequence[Chosen], gain: float, freedom: float, candidates: int) -> float:
@@ -97,10 +108,10 @@ def fit_roughly(score: float, base: Baseline, screen: Screened, least: float = -
 
 def refine(score: float, one: CandidateFit, worth: float = 0.0, rounds: int = 3) -> CandidateFit:
     """Fit a candidate again with derivatives of its own."""
-    return CandidateFit.of(score, fit(one.found.linearise(), one.found.numbers, rounds, min_gain=worth))
+    return CandidateFit.of(score, one.further(rounds, worth))
 
 
-def reshaped(found: LinearModel | MapFit, name: str, ways: Iterable[Mapping[str, float]], least: float = 0.0
+def reshaped(found: LinearModel | CandidateFit, name: str, ways: Iterable[Mapping[str, float]], least: float = 0.0
              ) -> LinearModel:
     """The model with other refinements of one of its effects, fitted from where it is until a round gains less than
     ``least``, with the likeliest of some ways. NotSimulated where none can be simulated."""
@@ -122,14 +133,14 @@ def with_refinements(now: Baseline, name: str, least: float) -> Baseline:
     plain = CandidateFit.of(now.score, now.linear)
     ways = [way for way in effect.trials() if not Chosen(effect, way).is_plain]
     try:
-        refined = CandidateFit.of(now.score, reshaped(plain.found, name, ways, least))
-        if (refined.found.state.effects[place].is_refined_too_far or not _explains_most(refined, plain)
+        refined = CandidateFit.of(now.score, reshaped(plain, name, ways, least))
+        if (refined.state.effects[place].is_refined_too_far or not _explains_most(refined, plain)
                 or not _explains_most(refined, CandidateFit.of(now.score, reshaped(
-                    refined.found, name, [effect.usual], least)))):
+                    refined, name, [effect.usual], least)))):
             return now
     except NotSimulated:
         return now
-    return Baseline.of(fit(refined.found.linearise(), refined.found.numbers))
+    return Baseline.of(refined.further())
 
 
 def _explains_most(more: CandidateFit, less: CandidateFit) -> bool:
@@ -138,7 +149,7 @@ def _explains_most(more: CandidateFit, less: CandidateFit) -> bool:
     gain = more.gain - less.gain
     return gain > INDISTINGUISHABLE and (
         more.hold_out.explains_most_beyond(less.hold_out)
-        or gain > most_of(gain_of_full_explanation(less.found.posterior, less.found.state)))
+        or gain > most_of(gain_of_full_explanation(less.posterior, less.state)))
 
 
 def _rough_fit(score: float, base: Baseline, trial: Trial) -> CandidateFit:
@@ -151,7 +162,7 @@ def _rough_fit(score: float, base: Baseline, trial: Trial) -> CandidateFit:
                       linear.state.record, linear.size, [])
     found = optimise_numbers(linear, state, free_parameters_of(state.effects))
     one = CandidateFit.of(score, relinearise(posterior, found, linear.numbers, score))
-    lost = one.found.score - base.score - len(free_parameters_of([one.chosen])) * float(np.log(posterior.freedom))
+    lost = one.score - base.score - len(free_parameters_of([one.chosen])) * float(np.log(posterior.freedom))
     return _fit_by_squares(score, base, state) if lost > min_gain(1) else one
 
 

@@ -13,16 +13,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from logger.arrays import Array
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import MapFit, own_slopes
+from logger.lab.likelihood.map_fit import own_slopes
 from logger.lab.likelihood.signals import deviance, error_with_rounding_noise
 from logger.runs import Run
+
+if TYPE_CHECKING:
+    from logger.lab.selection.candidate_fit import CandidateFit
 
 JUDGED_ON = "held-out stretches"
 """What the errors of steps and candidates are errors of."""
@@ -66,7 +69,7 @@ def folds(run: Run) -> npt.NDArray[np.intp]:
     return np.tile((time_s / stretch_s).astype(np.intp) % _FOLDS, 1 + len(run.signals))
 
 
-def cross_validate(fitted: LinearModel | MapFit, own: Sequence[Array] | None = None) -> HoldOut:
+def cross_validate(fitted: LinearModel | CandidateFit, own: Sequence[Array] | None = None) -> HoldOut:
     """Cross-validate a fitted model, with columns (m, n) per run whose coefficients are fitted too; None: those of its
     effects' numbers."""
     posterior, state = fitted.posterior, fitted.state

@@ -229,7 +229,7 @@ class MeasuredRoad:
 
     def with_effect(self, one: CandidateFit) -> Baseline:
         """The model with the effect, its runs aligned again."""
-        return Baseline.of(fit(align(one.found.posterior, one.found.state), one.found.numbers))
+        return Baseline.of(fit(align(one.posterior, one.state), one.numbers))
 
     def refined_beside(self, now: Baseline, name: str, least: float) -> Baseline:
         """Begun where the model ended."""
@@ -253,12 +253,11 @@ class MeasuredRoad:
         fitted to all of a run, do the same as many an effect.)"""
         return is_outside_data(base.posterior, one.chosen) or (base.on_rig and (
             one.hold_out.is_worse_than(base.hold_out)
-            or is_within_discrepancy(base.posterior, base.state, one.found.state)))
+            or is_within_discrepancy(base.posterior, base.state, one.state)))
 
     def leaves_noise(self, there: Baseline | CandidateFit) -> bool:
         """Whether what is left is noise of a colour."""
-        fitted = there if isinstance(there, Baseline) else there.found
-        return is_coloured_noise(fitted.posterior, fitted.state)
+        return is_coloured_noise(there.posterior, there.state)
 
     def is_at_floor(self, now: Baseline) -> bool:
         """Were sensors right but for their noise."""

@@ -70,7 +70,7 @@ def test_the_effect_that_is_there_promises_most_and_what_a_fit_then_gains(slight
     assert fine.gain >= rough.gain - 1.0
     counted = np.log(slight.posterior.freedom)  # of the number that it has
     assert fine.gain == pytest.approx(promises["sensor_offset"].gain - counted, rel=0.3)
-    assert fine.gain == pytest.approx(slight.score - fine.found.score)
+    assert fine.gain == pytest.approx(slight.score - fine.score)
     assert fine.chosen.effect is fine.effect is EFFECTS["sensor_offset"]
     assert fine.chosen.values["offset_m"] == pytest.approx(0.2, abs=0.1)
 

@@ -11,8 +11,8 @@ from scipy.stats import chi2
 
 from logger.lab.diagnosis import diagnose, refit
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import MapFit, align, fit
-from logger.lab.selection.candidate_fit import fit_roughly, refine
+from logger.lab.likelihood.map_fit import align, fit
+from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly, refine
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION
 from logger.lab.selection.screening import Baseline, misalignment, screen
 from logger.lab.selection.stepwise import MeasuredRoad, Search, SearchRound, Selection
@@ -159,8 +159,8 @@ def test_a_shape_at_the_end_of_its_range_is_not_taken(offset_base: Baseline) -> 
     ended_occupant = hidden("occupant", frequency_hz=EFFECTS["occupant"].parameters[1].high)
     state = posterior.state_at([ended_occupant], offset_base.state.logs)
     one = fit_roughly(offset_base.score, offset_base, screen(offset_base, EFFECTS["sensor_offset"], [STILL]))[0]
-    model = refine(offset_base.score, one, rounds=1).found
-    ended = replace(one, found=MapFit.of(fit(LinearModel(posterior, state), model.numbers, rounds=0)), gain=1e9)
+    model = refine(offset_base.score, one, rounds=1)
+    ended = replace(CandidateFit.of(0.0, fit(LinearModel(posterior, state), model.numbers, rounds=0)), gain=1e9)
     assert ended_occupant.at_bound and ended.effect.name == "occupant"
     assert not search(FEW).is_accepted(offset_base, ended)
 
