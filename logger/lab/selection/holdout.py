@@ -13,19 +13,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 import numpy.typing as npt
 
 from logger.arrays import Array
-from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import own_slopes
+from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.signals import deviance, error_with_rounding_noise
 from logger.runs import Run
-
-if TYPE_CHECKING:
-    from logger.lab.selection.candidate_fit import CandidateFit
 
 JUDGED_ON = "held-out stretches"
 """What the errors of steps and candidates are errors of."""
@@ -69,7 +66,20 @@ def folds(run: Run) -> npt.NDArray[np.intp]:
     return np.tile((time_s / stretch_s).astype(np.intp) % _FOLDS, 1 + len(run.signals))
 
 
-def cross_validate(fitted: LinearModel | CandidateFit, own: Sequence[Array] | None = None) -> HoldOut:
+class FittedState(Protocol):
+    """A fitted model, with derivatives by the car's numbers (p, n) per run."""
+
+    @property
+    def posterior(self) -> Posterior: ...
+
+    @property
+    def state(self) -> State: ...
+
+    @property
+    def numbers(self) -> Sequence[Array] | None: ...
+
+
+def cross_validate(fitted: FittedState, own: Sequence[Array] | None = None) -> HoldOut:
     """Cross-validate a fitted model, with columns (m, n) per run whose coefficients are fitted too; None: those of its
     effects' numbers."""
     posterior, state = fitted.posterior, fitted.state
