@@ -24,7 +24,7 @@ from logger.report.blocks import Block, Blocks, Lines, Table
 from logger.service.signal_chain import recorder_gain
 from logger.shipped import vehicle_path
 from logger.store.formats import vehicle_file
-from logger.store.formats.vehicle_file import find, fingerprint, keep, places
+from logger.store.formats.calibration_file import find, fingerprint, keep, places
 from logger.units import MPH_MPS
 from logger.vehicle.linearise import known_vehicle
 from logger.vehicle.vehicle import Vehicle

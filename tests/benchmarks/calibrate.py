@@ -27,7 +27,8 @@ from logger.roads import iso8608
 from logger.roads.elevation_spectrum import iri_per_root_gd
 from logger.service.signal_chain import recorder_gain
 from logger.shipped import vehicle_file, vehicle_names
-from logger.store.formats.vehicle_file import find, fingerprint, keep, read_vehicle
+from logger.store.formats.calibration_file import find, fingerprint, keep
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.units import FOOT_M, MPH_MPS
 from logger.vehicle.linearise import known_vehicle
 

@@ -10,8 +10,9 @@ import pytest
 from logger.estimation.rms_calibration import CalibrationSettings, RmsLine, SpeedCalibration
 from logger.files import STATE_BYTES
 from logger.shipped import shipped, vehicle_file
-from logger.store.formats import vehicle_file as module
-from logger.store.formats.vehicle_file import KEPT, find, fingerprint, keep, places, read_vehicle
+from logger.store.formats import calibration_file as module
+from logger.store.formats.calibration_file import KEPT, find, fingerprint, keep, places
+from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.vehicle import SensorPlace
 
 RAV4 = read_vehicle(vehicle_file("rav4-2009"))

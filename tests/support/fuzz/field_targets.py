@@ -27,7 +27,7 @@ from logger.service.config import Config
 from logger.service.status import read_status
 from logger.store.export.manifest import Manifest, list_blocks, manifest_blocks, read_manifest
 from logger.store.export.sticks import read_note
-from logger.store.formats import record_checks, vehicle_file
+from logger.store.formats import calibration_file, record_checks
 from logger.store.formats.csv_table import columns_of
 from logger.store.formats.drive_file import read_columns, read_run_facts, read_speeds
 from logger.store.formats.mat_file import read_arrays, read_geopoint
@@ -283,7 +283,7 @@ def _small(name: str, path: Path) -> Hashable:
             promise(isfinite(manifest.trim_m), "a length that is none")
             return len(manifest.commits)
         case "car.calibration.json":
-            return vehicle_file.find([path], "a" * 64) is None
+            return calibration_file.find([path], "a" * 64) is None
         case "trip_iri_1.json":
             _finite(ProfilerPass(path).iri_m_per_km)
             return 1
