@@ -11,7 +11,7 @@ same signature, kept on disk too; the loop knows it by its address. Without numb
 Functions of one code and the same constants beside it are one: what differs from car to car they get as ``p``. Their
 states are stepped by an exponential midpoint rule, each with its own decay, the motion at the mean of both ends of the
 step: exact for a state that decays towards something, however quickly (M. Hochbruck, A. Ostermann, Exponential
-integrators, Acta Numerica 19, 2010, 2.3).
+integrators, Acta Numerica 19, 2010, 2.3). One that grows is stepped by the midpoint rule itself.
 """
 
 import math
@@ -475,7 +475,10 @@ def _remember(law: Whole, one: int, given: Array, began: Array, memories: Array,
         middle[MEMORY_AT + c] = here
         growth = (answers[c] - rate) / small
         whole = growth * step_s
-        share = 1.0 + 0.5 * whole if abs(whole) < _SLOW_DECAY else np.expm1(whole) / whole
+        if whole > 0.0:  # what grows steeply at one place only, as a root does at 0, would be thrown e to the many far
+            memories[one, c] = start + step_s * rate
+            continue
+        share = 1.0 + 0.5 * whole if whole > -_SLOW_DECAY else np.expm1(whole) / whole
         memories[one, c] = start + step_s * share * (rate - growth * (here - start))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import namedtuple
 from dataclasses import replace
-from itertools import count
+from itertools import count, pairwise
 from math import pi, sqrt
 from pathlib import Path
 from types import SimpleNamespace
@@ -146,6 +146,14 @@ def test_hysteresis_moves_as_newton_says(travel_m: float, sharpness: float, reve
     states, _ = stepped(effect("hysteresis", yield_force_n=120.0, yield_travel_m=travel_m, sharpness_ratio=sharpness,
                                reversal_ratio=reversal))
     assert off(states, expected, plain) < 0.01
+
+
+@pytest.mark.parametrize("travel_m", [0.002, 0.01])
+def test_cars_that_hardly_differ_move_alike(travel_m: float, plain: np.ndarray) -> None:
+    """At no force a root of it rises without end: where a memory came near 0, one in a hundred cars was thrown away."""
+    cars = [stepped(effect("hysteresis", yield_force_n=120.0, yield_travel_m=travel_m, sharpness_ratio=0.3,
+                           reversal_ratio=reversal))[0] for reversal in np.linspace(-1.8, -1.7, 101)]
+    assert max(np.abs((one - other) / plain.std(axis=0)).max() for one, other in pairwise(cars)) < 0.01
 
 
 @pytest.mark.parametrize("creep_s", [0.01, 0.1])
