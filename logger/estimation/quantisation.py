@@ -109,18 +109,19 @@ def without_own(readings: GaussianReadings, fitted_mps2: Array, fitted_variance:
 
 
 def improved(readings: GaussianReadings, low: Array, high: Array, expected: Array, others: Array,
-             noise_variance: float) -> GaussianReadings:
+             noise_variance: float, alike: float = 0.0) -> GaussianReadings:
     """One round.
 
     low, high           (t,) bounds of each reading [m/s2]
     expected, others    (t,) of each acceleration by all other readings, as ``without_own``
     noise_variance      of a reading before it is rounded [(m/s2)2]
+    alike               by which it counts less, because others have the same error; that blurs no step
     """
     own = 1 / readings.variance
     spread = others + noise_variance
     mean, variance = within(expected, spread, low, high)
     precision = np.maximum(1 / variance - 1 / spread, 1e-9 / spread)
     value = (mean / variance - expected / spread) / precision
-    new = 1 / (1 / precision + noise_variance)
+    new = 1 / (1 / precision + noise_variance + alike)
     total = (1 - _KEPT) * new + _KEPT * own
     return GaussianReadings(((1 - _KEPT) * value * new + _KEPT * readings.value_mps2 * own) / total, 1 / total)

@@ -190,7 +190,8 @@ class FollowedRoad:
         count = len(low)
         centre = np.full(count, self._centre_mps2)
         nothing = GaussianReadings(centre, np.full(count, np.inf))
-        guess = improved(nothing, low, high, centre, np.full(count, self._accel_variance), self._noise_variance)
+        guess = improved(nothing, low, high, centre, np.full(count, self._accel_variance), self._noise_variance,
+                         self._alike(fresh))
         self._response.move_on(count)
         self._gaussian = GaussianReadings(np.concatenate([self._gaussian.value_mps2[count:], guess.value_mps2]),
                                           np.concatenate([self._gaussian.variance[count:], guess.variance]))
@@ -273,10 +274,9 @@ class FollowedRoad:
         log_variance = self._roughness.solved_with(first, block.count)
         local = np.exp(np.maximum(log_variance, _SMOOTHEST_SOLVED) - above_common)
         there = _levelled(spectrum, local)
-        beside_road = reads * (beyond_variance + self._other.variance_left)
+        beside_road = beyond_variance + self._other.variance_left
         if not self._noise_is_all:
-            beside_road += vehicle_error_variance(
-                block.car, block.mean_speed_mps, there, self._vehicle_error, RATE_HZ * reads)
+            beside_road += vehicle_error_variance(block.car, block.mean_speed_mps, there, self._vehicle_error, RATE_HZ)
         variance = readings.variance
         if self._is_coarse:  # it was in a reading before it was rounded
             self._beside_road = beside_road
@@ -373,7 +373,8 @@ class FollowedRoad:
         others = others + unexplained(solution.fitted_mps2[read], low[read], high[read], self._noise_variance)
         fitted_variance = 1 / (1 / others + 1 / readings.variance)
         expected, about = without_own(readings, solution.fitted_mps2, fitted_variance)
-        return improved(readings, low, high, expected, about, self._noise_variance), expected, about
+        found = improved(readings, low, high, expected, about, self._noise_variance, self._alike(samples))
+        return found, expected, about
 
     def _bounds(self, samples: RoadSamples) -> tuple[Array, Array]:
         return bounds(samples.reading_mps2.ravel(), samples.at_end.ravel(), self._step_mps2)
@@ -382,6 +383,11 @@ class FollowedRoad:
     def _noise_variance(self) -> float:
         """Of a reading about the road's part of it, before it is rounded [(m/s2)2]."""
         return self.sensor.noise_rms_mps2**2 + self._beside_road
+
+    def _alike(self, samples: RoadSamples) -> float:
+        """What is beside the road moves all reads of a sample alike, and they tell no more of the road than one: the
+        variance by which each counts less for that [(m/s2)2]."""
+        return (samples.reading_mps2.shape[1] - 1) * self._beside_road
 
     def _noise_evidence(self, expected: Array, others: Array, samples: RoadSamples, usable: Bools, newest: int
                         ) -> tuple[Array, int]:

@@ -53,6 +53,32 @@ def test_one_acceleration_read_again_and_again(deviation: float, steps: tuple[in
     assert found_spread == pytest.approx(spread, rel=0.12)
 
 
+@pytest.mark.parametrize("deviation", [0.2, 0.5])
+@pytest.mark.parametrize("steps", [(0, 0, 0, 0), (0, 1, 0, 1), (0, 0, 0, 1), (1, 1, 1, 1)])
+def test_an_error_that_all_reads_share_blurs_their_steps_no_more_than_those_of_one(
+    deviation: float, steps: tuple[int, ...]
+) -> None:
+    """By integration over the acceleration with its error: nearer to it than one error four times as large for each."""
+    noise, error_variance = 0.02, 0.07**2
+    low, high = bounds(COARSE.step_mps2 * np.array(steps) - 0.1, np.zeros(4), COARSE.step_mps2)
+    both_mean, both_spread = exact(np.sqrt(deviation**2 + error_variance), low, high,
+                                   Sensor(noise, COARSE.step_mps2))
+    share = deviation**2 / (deviation**2 + error_variance)
+    exactly = share * both_mean, np.sqrt((share * both_spread) ** 2 + (1 - share) * deviation**2)
+
+    def off(blurs: float, alike: float) -> float:
+        """Errors of mean, in standard deviations, and of the logarithm of that."""
+        readings = GaussianReadings((low + high) / 2, np.full(4, 0.1))
+        for _ in range(300):
+            variance = 1 / (deviation**-2 + (1 / readings.variance).sum())
+            mean = variance * (readings.value_mps2 / readings.variance).sum()
+            readings = improved(readings, low, high, *without_own(readings, np.full(4, mean), variance),
+                                noise**2 + blurs, alike)
+        return float(abs(mean - exactly[0]) / exactly[1] + abs(np.log(np.sqrt(variance) / exactly[1])))
+
+    assert off(error_variance, 3 * error_variance) < 0.9 * off(4 * error_variance, 0.0)
+
+
 @pytest.mark.parametrize("at_end", [-1.0, 1.0])
 @pytest.mark.parametrize(("count", "tolerance"), [(1, 0.02), (5, 0.35)])
 def test_a_reading_at_the_end_of_the_range_is_a_bound_on_one_side(at_end: float, count: int, tolerance: float) -> None:
