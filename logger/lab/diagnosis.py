@@ -351,7 +351,7 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
             state.logs, errors.covariance, fine.shows_forces).items() if name not in {**beyond, **left_open}},
         left_open=left_open,
         ends=search.likelihood.ends if isinstance(search.likelihood, UnknownNumbers) else {},
-        as_moved=None if left_open else effect_as_moved(after, [one for one in tried if one.name not in state.names]),
+        as_moved=effect_as_moved(after, [one for one in tried if one.name not in state.names], left_open),
         steps=_steps(selection, posterior.error(nominal)),
         effects=errors.effects,
         undetectable=hidden, shape=shape if excess > UNEXPLAINED else None, coloured=colour is not None,

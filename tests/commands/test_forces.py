@@ -928,6 +928,23 @@ def test_a_number_far_from_what_its_file_knows_is_named(tmp_path: Path, capsys: 
 
 
 @pytest.mark.slow
+def test_what_hangs_on_a_weighed_mass_is_told_by_its_move_though_other_numbers_are_open(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """A shaker's armature of 0.62 kg on 5 kg, whose spring and damper nobody knows."""
+    push = noise(25.0, 9.0, 3)
+    moved = Bench(5.62, 23000.0, 31.0).moved(NOTHING, push, NOTHING)["accel_z_mps2"]
+    read = moved + np.random.default_rng(1).normal(0.0, 0.02, len(moved))
+    run = written(tmp_path / "run", {"accel_z_mps2": read}, {"force_n": push(TIME_S)}, BODY)
+    (tmp_path / "plate.yaml").write_text("name: plate\nmodel: single_mass\nmass_kg: 5 +- 1%\n"
+                                         "stiffness_n_per_m: 16000 +- 50%\ndamping_n_s_per_m: unknown\n")
+    assert main(["diagnose", "--vehicle", str(tmp_path / "plate.yaml"), str(run), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert found["verdict"] == [] and found["beyond_tolerance"]["mass_kg"] == pytest.approx(0.124, abs=0.01)
+    assert found["shift_explained_by"]["effect"] == "payload"
+    assert found["shift_explained_by"]["parameters"]["mass_kg"] == pytest.approx(0.62, rel=0.12)
+
+
+@pytest.mark.slow
 def test_the_noise_of_what_drives_a_rig_is_in_the_errors_of_its_numbers(tmp_path: Path) -> None:
     """The resonance makes more of it than of all other noise: by the residual's level alone the errors of spring and
     damper over the mass would be a quarter. (The scale of all three is that of the sensor.)"""

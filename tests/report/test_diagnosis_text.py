@@ -101,6 +101,15 @@ def test_beside_something_unexplained_it_is_only_part_or_an_imitation() -> None:
                     "times the sensor's noise. Beyond that noise it is less than 0.1% of the measured power.")
 
 
+def test_what_is_left_is_the_share_that_is_not_explained_on_stretches_that_no_fit_saw() -> None:
+    """Two figures for one thing contradicted each other."""
+    steps = (*FOUND.steps[:-1], ErrorStep("with dry_friction", 0.457))
+    found = replace(FOUND, excess=3.0, final_error=0.145, steps=steps)
+    said = " ".join(diagnosis_summary(found))
+    assert f"it is {100 * (0.457**2 - found.noise_floor_error**2):.0f}% of the measured power" in said
+    assert "79% finally" in said
+
+
 def test_times_the_noise_are_times_the_noise_alone() -> None:
     """Also where the residual exceeds what calibrated sensors leave."""
     _, left, *_ = diagnosis_summary(replace(FOUND, excess=2.9, over_noise=37.0))

@@ -325,7 +325,7 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
 
 
 def _left_over(found: LabDiagnosis) -> str:
-    left = percent(max(found.final_error**2 - found.noise_floor_error**2, 0.0))
+    left = percent(max(1 - found.explained[1] - found.noise_floor_error**2, 0.0))
     over = max(found.excess, found.over_noise)
     return f"{1 + over:.3g} times the sensor's noise. Beyond that noise it is {left} of the measured power"
 
@@ -366,16 +366,16 @@ def _car(found: LabDiagnosis) -> list[str]:
                   "" if found.missing else ", or an effect is missing that acts as such a change does")
         lines.append(f"Parameters beyond their tolerance: {off}. Measure them: {'either ' * bool(either)}the vehicle's "
                      f"file is wrong there{either}.")
-    if found.left_open:
-        fitted = enumerated([f"{name} {measured(value, error)} {unit_of(name)}".rstrip()
-                             for name, (value, error) in found.left_open.items()], "and")
-        lines.append(f"Fitted parameters that the vehicle's file leaves open: {fitted}.")
     if found.moved:
         lines.append(_moved(found))
     if found.as_moved is not None:
         one = found.as_moved
         lines.append(f"{one.effect.name} ({one.effect.title}; {numbers_of(one)}) would bias all of them in this way. "
                      f"To find out: {one.effect.shown_by}.")
+    if found.left_open:
+        fitted = enumerated([f"{name} {measured(value, error)} {unit_of(name)}".rstrip()
+                             for name, (value, error) in found.left_open.items()], "and")
+        lines.append(f"Fitted parameters that the vehicle's file leaves open: {fitted}.")
     return lines
 
 
@@ -565,10 +565,12 @@ def car_sections(found: LabDiagnosis) -> list[Section]:
         return []
     bars = Bars("Shift of each parameter by the refit", "% of the file's value", tuple(
         (name, 100 * share) for name, (share, _) in found.car.moved.items()))
-    rows = [(name, f"{share:+.1%}", f"± {tolerance:.1%}", "beyond it" if name in found.beyond else "")
-            for name, (share, tolerance) in found.car.moved.items()]
+    rows = [(name, f"{share:+.1%}", f"± {deviation:.1%}" if deviation <= 1 else "unknown",
+             "beyond its tolerance" if name in found.beyond else "")
+            for name, (share, deviation) in found.car.moved.items()]
     return [
-        Detail("The car's parameters", [bars, Table(("Parameter", "Shift", "Tolerance", ""), rows, (0, 3)), Hint(
+        Detail("The car's parameters", [bars, Table(
+            ("Parameter", "Shift", "Known to (standard deviation)", ""), rows, (0, 3)), Hint(
             "A parameter that moves far may stand in for an effect that ridelog does not know.")] if rows else []),
         Detail("Springs and dampers", [*map(_force, found.car.curves), Hint(
             "Over the range that the model's suspensions reach in 99.9 % of these runs, without forces that have a "

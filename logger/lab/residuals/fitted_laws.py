@@ -33,8 +33,8 @@ class ForceCurve:
 
 @dataclass(frozen=True, eq=False)
 class FittedCar:
-    """moved: the relative change of each of the car's numbers, and its tolerance; curves: of suspensions whose laws
-    differ from the file's."""
+    """moved: the relative change of each of the car's numbers, and the standard deviation that it was known to; curves:
+    of suspensions whose laws differ from the file's."""
 
     moved: Mapping[str, tuple[float, float]]
     curves: tuple[ForceCurve, ...]
@@ -43,7 +43,7 @@ class FittedCar:
 def fitted_car(posterior: Posterior, stood: State, found: State) -> FittedCar:
     """The car of a fitted state in comparison with another state."""
     prior = posterior.prior
-    moved = {name: (float(np.expm1(log)), float(np.expm1(deviation))) for name, log, deviation in zip(
+    moved = {name: (float(np.expm1(log)), float(deviation)) for name, log, deviation in zip(
         prior.names, found.logs, prior.deviations, strict=True)}
     before, after = (posterior.car(one.effects, one.logs) for one in (stood, found))
     if not after.bends_laws:

@@ -8,11 +8,12 @@ significance (G. Cowan et al., European Physical Journal C 71, 2011: an Asimov d
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from logger.arrays import Array
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.selection.evidence import IMITATION
 from logger.lab.selection.screening import scale_strength
@@ -46,13 +47,15 @@ def undetectable_effects(found: LinearModel, effects: Sequence[Effect]) -> tuple
                         key=lambda one: one.deviations))
 
 
-def effect_as_moved(found: LinearModel, effects: Sequence[Effect]) -> Chosen | None:
+def effect_as_moved(found: LinearModel, effects: Sequence[Effect], left_open: Collection[str] = ()) -> Chosen | None:
     """The effect that changes the records as the refit of the car's numbers does, with its strength: one that is a
-    combination of numbers in the file. None: none explains all of that
+    combination of numbers in the file. Those that the file leaves open are as fitted before the refit as well: their
+    move says nothing. None: none explains all of that
     change but the share that imitations may have, or it is within the noise. A load of 100 kg and a centre of gravity
     0.1 m ahead, which the numbers of a car of 875 kg absorb, explain 0.98 of it, others 0.79 at most."""
     sensitivity = _Sensitivity(found)
-    alike = [sensitivity.as_moved(chosen(effect, effect.usual)) for effect in effects
+    filed = np.where(np.isin(found.prior.names, list(left_open)), found.state.logs, 0.0)
+    alike = [sensitivity.as_moved(chosen(effect, effect.usual), filed) for effect in effects
              if isinstance(effect, VehicleEffect) and any(one.null is not None for one in effect.parameters)]
     share, best = max(alike, key=lambda pair: pair[0], default=(0.0, None))
     return best if share > 1 - IMITATION else None
@@ -82,19 +85,23 @@ class _Sensitivity:
                                key=lambda one: one[0])
         return Undetectable(effect, found, alike)
 
-    def as_moved(self, one: Chosen) -> tuple[float, Chosen | None]:
-        """Share of the squared change of the records by the car's refit that an effect explains at its best strength,
-        and the effect with that; 0 where it cannot have it, or where the noise does as much."""
-        filed = np.zeros_like(self._state.logs)
+    def as_moved(self, one: Chosen, filed: Array) -> tuple[float, Chosen | None]:
+        """Share of the squared change of the records by the car's refit from the logarithms ``filed`` (p,) that an
+        effect explains at its best strength, and the effect with that; 0 where it cannot have it, or where the noise
+        does as much."""
         before = self._predictions(self._state.effects, filed)
-        moved, changed = ([new - old for new, old in zip(there, before, strict=True)] for there in (
-            self._here, self._predictions((*self._state.effects, one), filed)))
-        p = self._linear.count
-        (refit, along), (_, own) = self._linear.information(
-            self._linear.whitened([np.stack(both) for both in zip(moved, changed, strict=True)]))[p:, p:]
-        there = scale_strength(one, along / own) if own > 0 else None
-        if there is None or there.at_bound or along**2 < DETECTABLE_SIGMA**2 * own:
-            return 0.0, None
+        p, there = self._linear.count, one
+        for _ in range(5):  # where a resonance moves by its width, a record is not proportional to the strength
+            moved, changed = ([new - old for new, old in zip(predicted, before, strict=True)] for predicted in (
+                self._here, self._predictions((*self._state.effects, there), filed)))
+            (refit, along), (_, own) = self._linear.information(
+                self._linear.whitened([np.stack(both) for both in zip(moved, changed, strict=True)]))[p:, p:]
+            scaled = scale_strength(there, along / own) if own > 0 else None
+            if scaled is None or scaled.at_bound or along**2 < DETECTABLE_SIGMA**2 * own:
+                return 0.0, None
+            there = scaled
+            if abs(along / own - 1) < IMITATION:
+                break
         return float(along**2 / (own * refit)), there
 
     def _deviations(self, one: Chosen) -> tuple[float, str | None]:
