@@ -303,7 +303,8 @@ def begin_search(posterior: Posterior, effects: Mapping[str, Effect], present: S
     before = refit(posterior, nominal) if unknown is None else unknown.fitted(posterior, present)
     search: Search[Baseline, Screened, CandidateFit] = Search(
         tried, len(present), misalignment(posterior, nominal), progress,
-        effort=SearchEffort() if unknown is None else SearchEffort(fitted=3),
+        # Of a part, whose motion is given, fits take a hundredth of those of a car.
+        effort=SearchEffort(beginnings=2 * before.is_part) if unknown is None else SearchEffort(fitted=3),
         likelihood=unknown or MeasuredRoad())
     return search, before
 

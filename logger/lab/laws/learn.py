@@ -243,11 +243,8 @@ class FamilySearch:
     @property
     def _known_forces(self) -> list[Effect]:
         """Of a part the effects that are forces; of a car all of them."""
-        return [one for one in self.search.effects if isinstance(one, ForceEffect) or not self._is_part]
-
-    @property
-    def _is_part(self) -> bool:
-        return self.selection.before.posterior.vehicle.model == "component"
+        is_part = self.selection.before.is_part
+        return [one for one in self.search.effects if isinstance(one, ForceEffect) or not is_part]
 
     def best(self) -> Law | None:
         """The law with the most evidence, alone or with known effects; None where known effects without one have more,
@@ -277,7 +274,7 @@ class FamilySearch:
         context = LawContext(base.posterior, base.state)
         drafts = {draft.effect: draft for family in self.families.values() if any_family or family.stands_out
                   for draft in family.drafts(context) if draft.key not in self.refused
-                  and (family.stands_out or isinstance(draft.effect, ForceEffect) or not self._is_part)}
+                  and (family.stands_out or isinstance(draft.effect, ForceEffect) or not base.is_part)}
         self.drafts.update(drafts)
         search = replace(self.search, effects=[*drafts], present=len(base.effects), _promising=set(), _rivals={},
                          effort=replace(self.search.effort, effects=1))
@@ -317,7 +314,7 @@ class FamilySearch:
     def _leaves_something(self, model: Baseline) -> bool:
         """Whether a model leaves more than noise, and than calibration errors. Of a part these leave nothing: a gain of
         its force is a factor of all forces in it, whose sizes are fitted."""
-        return model.explanation > 0 if self._is_part else exceeds_noise(model)
+        return model.explanation > 0 if model.is_part else exceeds_noise(model)
 
     def _law(self, found: Selection) -> Law | None:
         """The law of a model; None where a known effect explains more in its place."""

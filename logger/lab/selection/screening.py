@@ -3,7 +3,8 @@
 Problem: most effects do nothing at their null and something quite different at each of their values, so that a
 derivative at zero strength says little about them (a shape such as a knee or a frequency has no meaning there).
 Solution: each is simulated at a few trial values; what the car's own numbers and the distance errors could do as well
-is projected out (a score test), and the trial that explains most, at its best strength, is where a fit begins.
+is projected out (a score test), and the trial that explains most, at its best strength, is where a fit begins. Of a
+part on its bench, what the numbers of its effects could do is, too (C. R. Rao, Proc. Cambridge Phil. Soc. 44, 1948).
 """
 
 from __future__ import annotations
@@ -16,9 +17,9 @@ from itertools import pairwise
 import numpy as np
 
 from logger.arrays import Array
-from logger.fitting.fisher_scoring import inverse
+from logger.fitting.fisher_scoring import inverse, inverse_with_prior
 from logger.lab.likelihood.linear_model import LinearModel
-from logger.lab.likelihood.map_fit import align, effect_slopes
+from logger.lab.likelihood.map_fit import align, effect_slopes, own_slopes
 from logger.lab.likelihood.noise_floor import excess_over_noise, gain_of_full_explanation
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.whittle import UNEXPLAINED
@@ -36,66 +37,79 @@ _STRONGEST, _STRONGEST_SHIFT, _WEAKEST = 10.0, 1000.0, 0.03
 
 @dataclass(frozen=True, eq=False)
 class _Quadratic:
-    """The objective of a fitted model to second order in the car's numbers.
+    """The objective of a fitted model to second order in the numbers of the car (p) and of its effects (m).
 
+    own            whitened derivatives by the latter (m, kept), per run; m = 0: they are held
     residuals      whitened (kept,) per run
-    covariance     of the car's numbers (p, p)
-    newton_step    of these to the minimum (p,)
+    covariance     of all these numbers (p + m, p + m)
+    newton_step    of these to the minimum (p + m,)
     objective      there: sum of squares of the residuals and cost of the priors
     """
 
-    linear: LinearModel
+    own: list[Array]
     residuals: list[Array]
     covariance: Array
     newton_step: Array
     objective: float
 
     @staticmethod
-    def of(linear: LinearModel) -> _Quadratic:
+    def of(linear: LinearModel, own: list[Array]) -> _Quadratic:
         """The quadratic of a linearised model."""
         state = linear.state
         here = linear.fit_record_errors(state.predictions)
-        covariance = np.asarray(np.linalg.inv(linear.information()), float)
-        gradient = linear.gradient(here.residuals, state.logs)
+        covariance = inverse_with_prior(linear.information(own))
+        gradient = linear.gradient(here.residuals, state.logs, own)
         step = covariance @ gradient
-        return _Quadratic(linear, here.residuals, covariance, step,
+        return _Quadratic(own, here.residuals, covariance, step,
                           here.squares + linear.prior.cost(state.logs) - float(gradient @ step))
+
+    def beside(self, white: Sequence[Array]) -> list[Array]:
+        """Whitened columns (k, kept), per run, below those of the effects' numbers."""
+        return [np.vstack(pair) for pair in zip(self.own, white, strict=True)]
 
 
 @dataclass(frozen=True, eq=False)
 class Baseline:
     """A fitted model that effects are tried on.
 
+    linear           linearised at its state
     score            minus twice the log of its evidence
     explanation      gain of a full explanation of the residuals
     rough            predictions of a rough simulation, for comparison with others
-    quadratic        of its objective
     trend_removed    whether start and scale errors of the distances are taken to be 0
     """
 
+    linear: LinearModel
     score: float
     explanation: float
     rough: list[Array]
-    quadratic: _Quadratic
     trend_removed: bool = False
 
     @staticmethod
     def of(linear: LinearModel, trend_removed: bool = False) -> Baseline:
         """The baseline of a linearised model."""
         state = linear.state
-        return Baseline(linear.score, gain_of_full_explanation(linear.posterior, state),
-                        linear.posterior.predict(state.effects, state.logs, state.record, rough=True),
-                        _Quadratic.of(linear), trend_removed)
+        return Baseline(linear, linear.score, gain_of_full_explanation(linear.posterior, state),
+                        linear.posterior.predict(state.effects, state.logs, state.record, rough=True), trend_removed)
+
+    @cached_property
+    def quadratic(self) -> _Quadratic:
+        """Of its objective; with the numbers of its effects free where its motion is given, as derivatives by them are
+        exact then and take milliseconds. (Differences of a motion that is simulated are not: with them a mount was
+        found in a beam that has none.)"""
+        slopes = own_slopes(self.posterior, self.state, self.linear.whiteners) if self.is_part else None
+        return _Quadratic.of(self.linear, [np.empty((0, one.kept)) for one in self.linear.whiteners]
+                             if slopes is None else self.linear.whitened(slopes))
+
+    @property
+    def is_part(self) -> bool:
+        """Whether it is of a part alone, whose motion its bench gives."""
+        return self.posterior.vehicle.model == "component"
 
     @property
     def posterior(self) -> Posterior:
         """The posterior that was fitted."""
         return self.linear.posterior
-
-    @property
-    def linear(self) -> LinearModel:
-        """The model linearised at its state."""
-        return self.quadratic.linear
 
     @property
     def state(self) -> State:
@@ -304,15 +318,16 @@ def _trial_at_best_strength(base: Baseline, one: Chosen) -> Trial:
     linear, quadratic = base.linear, base.quadratic
     change = partial(_change, base, [one], base.state.logs)
     white = linear.whitened(change())
-    here = base.state.logs + quadratic.newton_step
-    (mixed,), ((own,),) = linear.cross_products([one[None] for one in white])
+    p, here = linear.count, base.state.logs + quadratic.newton_step[: linear.count]
+    by_car, among = linear.cross_products(quadratic.beside([one[None] for one in white]))
+    mixed, own = np.concatenate([by_car[-1], among[-1, :-1]]), float(among[-1, -1])
     absorbed = quadratic.covariance @ mixed
     along = (sum(float(c @ r) for c, r in zip(white, quadratic.residuals, strict=True))
              - float(mixed @ quadratic.newton_step))
     own -= float(mixed @ absorbed)
 
     def at(share: float, values: Chosen) -> Trial:
-        logs = here - share * absorbed
+        logs = here - share * absorbed[:p]
         objective = quadratic.objective - 2 * share * along + share**2 * own
         return Trial(values, quadratic.objective - objective, logs, change)
 
@@ -332,21 +347,21 @@ def _trial_at_best_strength(base: Baseline, one: Chosen) -> Trial:
 
 def _trial_at_best_strengths(base: Baseline, one: Chosen, strengths: Sequence[int]) -> Trial:
     """The trial of an effect with several strengths, its parameters at these places, after one Gauss-Newton step of
-    these and of the car's numbers from their nulls."""
+    these, from their nulls, and of all other numbers."""
     linear, state = base.linear, base.state
     nulls = {each.name: each.null for each in one.effect.parameters if each.is_free and each.null is not None}
     effects = (*state.effects, replace(one, values={**one.values, **nulls}))
     free = [FreeParameter(len(state.effects), place) for place in strengths]
     slopes = effect_slopes(base.posterior, effects, state.logs, free, state.record, None)
-    white, residuals = linear.whitened(slopes), linear.fit_record_errors(state.predictions).residuals
+    white, residuals = base.quadratic.beside(linear.whitened(slopes)), base.quadratic.residuals
     gradient, information = linear.gradient(residuals, state.logs, white), linear.information(white)
-    p = linear.count
+    p, others = linear.count, len(gradient) - len(free)
     # A point of a curve beyond all motions has no derivative, and stays at 0.
     step = inverse(information) @ gradient
-    without = np.linalg.solve(information[:p, :p], gradient[:p]) if p else np.empty(0)
-    there = with_coordinates(effects, free, coordinates_of(effects, free) + step[p:])
-    return Trial(there[-1], float(gradient @ step - gradient[:p] @ without), state.logs + step[:p],
-                 lambda: [step[p:] @ one for one in slopes])
+    without = float(gradient[:others] @ base.quadratic.newton_step)
+    there = with_coordinates(effects, free, coordinates_of(effects, free) + step[others:])
+    return Trial(there[-1], float(gradient @ step) - without, state.logs + step[:p],
+                 lambda: [step[others:] @ one for one in slopes])
 
 
 def _goes_both_ways(effect: Effect) -> bool:
@@ -365,8 +380,8 @@ def _with_predicted_gain(base: Baseline, trial: Trial) -> Trial:
 
 
 def _trial_at_values(base: Baseline, one: Chosen, besides: tuple[Chosen, ...] = ()) -> Trial:
-    """The trial at its own values; the car's numbers take one Newton step, and those that the effect sets are held at
-    their nominal values.
+    """The trial at its own values; all other numbers take one Newton step, and those of the car that the effect sets
+    are held at their nominal values.
 
     besides    what else differs
     """
@@ -374,10 +389,10 @@ def _trial_at_values(base: Baseline, one: Chosen, besides: tuple[Chosen, ...] = 
     logs = np.where(np.isin(linear.prior.names, one.effect.replaces), 0.0, base.state.logs)
     change = partial(_change, base, (one, *besides), logs)
     found = linear.fit_record_errors([fine + more for fine, more in zip(base.state.predictions, change(), strict=True)])
-    gradient = linear.gradient(found.residuals, logs)
-    step = np.linalg.solve(linear.information(), gradient)
+    gradient = linear.gradient(found.residuals, logs, base.quadratic.own)
+    step = inverse_with_prior(linear.information(base.quadratic.own)) @ gradient
     objective = found.squares + linear.prior.cost(logs) - float(gradient @ step)
-    return Trial(one, base.quadratic.objective - objective, logs + step, change)
+    return Trial(one, base.quadratic.objective - objective, logs + step[: linear.count], change)
 
 
 def _realigned_trial(base: Baseline, one: Chosen, trial: Trial) -> Trial:

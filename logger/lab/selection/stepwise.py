@@ -46,6 +46,7 @@ class SearchEffort:
     """How much work a search takes; more of it finds no less.
 
     effects                    most effects that are added
+    beginnings                 of how many others that it might have begun with it tries each with one more
     fitted                     how many effects are fitted at most
     fit_share, refine_share    of what has to be gained, as far as that is known, an effect that is fitted has gained so
                                much by its screening, and one that is fitted with derivatives of its own by its rough
@@ -57,6 +58,7 @@ class SearchEffort:
     """
 
     effects: int = 4
+    beginnings: int = 0
     fitted: int = 6
     fit_share: float = 0.1
     refine_share: float = 0.25
@@ -193,6 +195,7 @@ class MeasuredRoad:
         misaligned = [seen]
         if base.state.size.is_unusually_large:
             misaligned.append(misalignment_of_record(base))
+        _ = base.quadratic  # worked out once, before several threads ask for it
         found: dict[str, Screened] = {}
         for done, one in enumerate(pool.map(lambda effect: screen(base, effect, misaligned, near), effects), 1):
             progress(f"screened {done} of {len(effects)} effects")
@@ -343,7 +346,7 @@ class Search(Generic[M, P, F]):
     def run(self, before: M) -> Selection[M, P, F]:
         """Search on top of a fitted model. Where it ends with refinements of an effect and leaves more than noise, they
         may imitate others together: these are sought without that effect, and taken where they are likelier."""
-        found = self._begun(before)
+        found = self._begun_otherwise(self._begun(before))
         refined = [one.effect for one in found.now.effects[self.present:] if not one.is_plain]
         if not refined or not self._leaves_more_than_noise(found.now):
             return found
@@ -353,6 +356,29 @@ class Search(Generic[M, P, F]):
         if other.now.score > found.now.score - INDISTINGUISHABLE:
             return found
         return replace(other, first=found.first) if other.before is found.before else other
+
+    def _begun_otherwise(self, found: Selection[M, P, F]) -> Selection[M, P, F]:
+        """The result of a search, or a likelier one. Of two effects that act in series each alone explains little, and
+        another may stand for both, with a sensor's effect or others beside it. Where it leaves more than noise, others
+        of the first round are begun with, too, and gone on with where one more explains as much as all that was found:
+        without what imitates a part of anything, as a sensor does, which is sought after that, in their place too."""
+        rest = replace(self, effects=[one for one in self.effects if not self.likelihood.imitates_any(one)], _rivals={})
+        rivals = [one for one in found.first.fits if one.effect in rest.effects and one.effect not in {
+            each.effect for each in found.now.effects} and (
+                self.is_accepted(found.before, one) or self.may_imitate(found.before, one))] if found.gains else []
+        for one in rivals[: self.effort.beginnings]:
+            if not self._leaves_more_than_noise(found.now):
+                break
+            self.progress(f"is it {one.effect.name} and another?")
+            begun, least = self.likelihood.with_effect(one), found.now.score
+            tried = rest.round(begun, [other for other in rest.effects if other is not one.effect])
+            best = rest._simplest(begun, tried)
+            if best is not None and begun.score - best.gain < least + INDISTINGUISHABLE:
+                other = rest.go_on(Selection(found.before, begun, {}, {}, found.first, (
+                    (one.effect.name, begun.hold_out),)), tried)
+                if other.now.score < least - INDISTINGUISHABLE:
+                    _, found = rest.with_more(other, [one for one in self.effects if one not in rest.effects])
+        return found
 
     def _leaves_more_than_noise(self, now: M) -> bool:
         return now.explanation > 0 and not (self.likelihood.leaves_noise(now) or self.likelihood.is_at_floor(now))

@@ -53,7 +53,8 @@ class World:
 
         @dataclass(frozen=True)
         class Model(Made):
-            posterior: Any = field(default_factory=lambda: SimpleNamespace(vehicle=SimpleNamespace(model=of)))
+            posterior: Any = field(default_factory=SimpleNamespace)
+            is_part: bool = of == "component"
 
             @property
             def score(self) -> float:

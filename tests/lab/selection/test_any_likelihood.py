@@ -166,6 +166,21 @@ def test_no_more_are_found_than_were_sought_until_it_goes_on() -> None:
     assert list(one.go_on(found).gains) == ["sensor_gain", "tire_damping"]
 
 
+def test_two_in_series_are_found_where_each_alone_explains_less_than_another(monkeypatch: pytest.MonkeyPatch) -> None:
+    def score(self: Made) -> float:
+        names = {one.effect.name for one in self.effects}
+        both = {"tire_damping", "sensor_offset"} <= names
+        return -450.0 if both else -max([WORTH[name] for name in names], default=0.0)
+
+    monkeypatch.setitem(WORTH, "damper_asymmetry", 200.0)
+    monkeypatch.setattr(Made, "score", property(score))
+    sought = search()
+    sought.effects = [EFFECTS[name] for name in ("damper_asymmetry", "tire_damping", "sensor_offset")]
+    assert [*sought.run(Made()).gains] == ["damper_asymmetry"]
+    sought.effort = replace(sought.effort, beginnings=2)
+    assert {*sought.run(Made()).gains} == {"tire_damping", "sensor_offset"}
+
+
 def test_what_is_doubtful_is_not_found() -> None:
     assert list(search("sensor_gain").run(Made()).gains) == ["tire_damping", "sensor_offset"]
 
