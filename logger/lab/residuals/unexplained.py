@@ -129,8 +129,8 @@ class _Cosines:
         self.samples, self.count, self.size = samples, count, max(more, count + 2)
 
     def of(self, samples: Array) -> Array:
-        """Coefficients (..., k) of samples (..., n)."""
-        return np.asarray(self._dct(samples, norm="ortho", axis=-1)[..., : self.size])
+        """Coefficients (k,) of samples (n,)."""
+        return np.array(self._dct(samples, norm="ortho")[: self.size])  # a copy: a slice would keep them all
 
     def back(self, coefficients: Array) -> Array:
         """Samples (n,) of coefficients (k,)."""
@@ -169,7 +169,7 @@ def _fit_white(form: str, basis: _Cosines, seen: Array, level: float, time_s: Ar
         offset = float(seen[0]) / float(np.sqrt(basis.samples))
         bic = float(seen[1:] @ seen[1:]) / level + float(np.log(basis.count))
         return _Curve(form, bic, offset, None, lambda at: np.full(len(at), offset))
-    columns = basis.of(np.stack([shape(time_s) for _, shape in shapes]))[:, : basis.count]
+    columns = np.stack([basis.of(shape(time_s))[: basis.count] for _, shape in shapes])
     # The constant is the first coefficient alone.
     free = columns[:, 1:]
     sizes = free @ seen[1:] / np.maximum((free**2).sum(axis=1), 1e-300)
