@@ -52,7 +52,8 @@ class SearchEffort:
                                much by its screening, and one that is fitted with derivatives of its own by its rough
                                fit: fits gain up to seven times what their screening did (measured on cases of the
                                examination)
-    tie_share                  all fits of an effect from different starts that gain this share of its best are refined
+    tie_share                  all fits of an effect from different starts that gain this share of the best of its form,
+                               plain or with refinements, are refined
     round_share                least gain of a round of a fit, as a share of what is left to explain: where much is
                                left, a rough fit is enough
     """
@@ -565,10 +566,13 @@ class Search(Generic[M, P, F]):
                 pair for pair in worth[1:] if _gains_enough(pair[1], enough)], enough)
             rough = self._best_of_each(tries)
             enough = effort.refine_share * max([to_gain, *(one.gain for one in (*rough, *beside.fits))])
-            best = {one.effect.name: one.gain for one in rough if _gains_enough(one, enough)}
-            good = [one for one in sorted(tries, key=lambda one: -one.gain)
-                    if one.gain > effort.tie_share * best.get(one.effect.name, np.inf)]
-            if len(good) == 1 and instead_of is None and beside is UNTRIED and self.is_accepted(now, good[0]):
+            by_gain = sorted(tries, key=lambda one: -one.gain)
+            worthy = {one.effect.name for one in by_gain if _gains_enough(one, enough)}
+            best = {(one.effect.name, one.chosen.is_plain): one.gain for one in reversed(by_gain)}
+            good = [one for one in by_gain if one.effect.name in worthy
+                    and one.gain > effort.tie_share * best[one.effect.name, one.chosen.is_plain]]
+            if (len(good) == 1 and good[0] in rough and instead_of is None and beside is UNTRIED
+                    and self.is_accepted(now, good[0])):
                 good = []  # the only one: it is fitted in full when it is added
             self.progress(f"refining {len(good)} of them")
             refine = partial(self.likelihood.refined, now, least=effort.round_share * now.explanation)

@@ -286,6 +286,33 @@ def test_what_refinements_imitate_together_is_found_without_their_effect_unless_
     assert [*sought.run(Made()).gains] == named
 
 
+class Slow(MadeUp):
+    """Friction whose refinements gain most of all, and by a rough fit hardly more than its plain form: next to nothing.
+    The others are doubtful."""
+
+    def fitted_roughly(self, score: float, base: Made, one: Tried, least: float) -> list[Tried]:
+        if one.effect.name != "dry_friction":
+            return super().fitted_roughly(score, base, one, least)
+        refined = self.refined_beside(one.model, one.effect.name, least)
+        return [Tried(refined, 100.0), Tried(one.model, 5.0)]
+
+    def refined(self, base: Made, one: Tried, least: float) -> Tried:
+        return replace(one, gain=base.score - one.model.score)
+
+    def explains_most(self, without: Made | Tried, there: Made | Tried) -> bool:
+        if isinstance(without, Made) or isinstance(there, Made):
+            return False
+        return there.gain - without.gain > (without.model.explains - without.gain) / 2
+
+
+def test_refinements_are_compared_with_the_plain_form_where_both_are_fitted(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(WORTH, "dry_friction", 300.0)
+    sought = search()
+    sought.likelihood = Slow(("sensor_gain", "tire_damping", "sensor_offset"))
+    found = sought.run(Made())
+    assert [(one.effect.name, one.is_plain) for one in found.now.effects] == [("dry_friction", False)]
+
+
 @pytest.mark.parametrize("later", WORTH)
 def test_a_search_that_goes_on_with_one_more_effect_finds_the_same_and_fits_nothing_twice(later: str) -> None:
     few = search()
