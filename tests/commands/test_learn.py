@@ -10,6 +10,7 @@ import pytest
 import ridelog
 from logger.commands.main import main
 from logger.errors import BadInput
+from logger.shipped import vehicle_file
 
 
 @pytest.fixture(scope="module")
@@ -46,3 +47,17 @@ def test_where_nothing_is_missing_nothing_is_written(plain_run: Path, tmp_path: 
     assert found["law"] is None and found["family"] is None and not law.exists()
     assert found["words"] == "nothing is missing, so there is no law to learn" and found["verdict"] == []
     assert found["error_after"] == pytest.approx(found["noise_floor_error"], rel=0.1)
+
+
+@pytest.mark.slow
+def test_where_a_known_effect_is_missing_the_command_that_adds_it_is_next(
+        tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("rubbing.yaml").write_text(vehicle_file("rav4-2009").read_text("utf-8").replace(
+        "effects: []", "effects: [{name: dry_friction, friction_force_n: 200}]"), "utf-8")
+    road = ridelog.random_road(iso_class="C", length_m=180.0, seed=2)
+    ridelog.write_run(Path("run"), ridelog.simulate("rubbing.yaml", road, speed_mps=12.0, noise_mps2=0.05))
+    assert main(["learn", "--vehicle", "rav4-2009", "--out", "law.py", "run"]) == 0
+    *_, last = capsys.readouterr().out.rstrip().splitlines()
+    assert last == "Next: ridelog add-effect dry_friction --vehicle rav4-2009 --out with-dry_friction.yaml run"
+    assert not Path("law.py").exists()

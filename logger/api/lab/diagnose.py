@@ -16,7 +16,7 @@ from logger.api.lab import words as lab_words
 from logger.api.lab.bench import Bench, among, bench_with, known_effects, tolerance_of, with_candidates, word_of
 from logger.api.lab.checks import check_distances, check_record, driven_parts, thinned_runs
 from logger.api.lab.compare import forces_section, spectra
-from logger.api.lab.question import DiagnoseQuestion
+from logger.api.lab.question import DiagnoseQuestion, LabQuestion
 from logger.api.shared_fields import each
 from logger.chart_data import Array, Bars, Curves, Line
 from logger.errors import BadInput
@@ -142,11 +142,18 @@ def _compared(bench: Bench) -> str:
             f"ridelog knows {len(bench.effects)} effects.")
 
 
+def addition_words(question: LabQuestion, bench: Bench, found: LabDiagnosis) -> str:
+    """The command that adds what is missing; nothing where nothing is, or all of it may only imitate."""
+    if not found.missing or all(map(found.may_imitate, found.verdict)):
+        return ""
+    asked = "+".join(_asked(bench.files.get(one.effect.name, one.effect.name), one) for one in found.missing)
+    names = "-".join(one.effect.name for one in found.missing)
+    return "Next: " + question.command(f"add-effect {asked} {{}} --out with-{names}.yaml")
+
+
 def _next(question: DiagnoseQuestion, bench: Bench, found: LabDiagnosis) -> str:
-    if found.missing and not all(map(found.may_imitate, found.verdict)):
-        asked = "+".join(_asked(bench.files.get(one.effect.name, one.effect.name), one) for one in found.missing)
-        names = "-".join(one.effect.name for one in found.missing)
-        return "Next: " + question.command(f"add-effect {asked} {{}} --out with-{names}.yaml")
+    if adding := addition_words(question, bench, found):
+        return adding
     if found.beyond and not found.exceeds_noise:
         words = (f"Next: check {', '.join(found.beyond)} in the vehicle's file. This command fits them to the runs "
                  "alone:")

@@ -11,7 +11,7 @@ from typing import Any
 
 from logger.api.lab import words as lab_words
 from logger.api.lab.bench import Bench, bench_with
-from logger.api.lab.diagnose import shape_sections
+from logger.api.lab.diagnose import addition_words, shape_sections
 from logger.api.lab.question import LearnQuestion
 from logger.chart_data import Chart, Curves
 from logger.files import write_text
@@ -51,6 +51,7 @@ class LearnedLaw(lab_words.ModelByModel):
     parameters           with ``standard_errors``, by name
     error_before         of the model as it was; ``error_after`` with the law, ``error_after_unseen`` on what no fit saw
     verdict              known effects that are missing, together with the law or instead of one
+    next_command         that adds these instead of one; empty: none are, or a law is learned
     """
 
     found: LearnedModel
@@ -65,6 +66,7 @@ class LearnedLaw(lab_words.ModelByModel):
     error_after_unseen: float
     verdict: tuple[str, ...]
     curves: tuple[Chart, ...]
+    next_command: str
 
     def charts(self) -> Sequence[Chart]:
         """The law over the motions that the runs had."""
@@ -84,10 +86,10 @@ class LearnedLaw(lab_words.ModelByModel):
         return page(f"{self.vehicle}: a law learned from runs", runs, self.blocks())
 
     def next_words(self, question: Any, written: Mapping[str, Sequence[Path]]) -> str:
-        """How to add the law, together with what it was fitted with."""
+        """How to add the law, together with what it was fitted with, or what is missing instead."""
         law = next((one for one in written.get("--out", ()) if one.suffix == ".py"), None)
         if not self.source or law is None or self.found.addition is None:
-            return ""
+            return self.next_command
         file = str(law) if law.is_absolute() else f"./{law}"
         names = [file, *(one.file or one.effect.name for one in self.found.addition.new
                          if one.effect.name in self.verdict)]
@@ -99,13 +101,14 @@ def learn(question: LearnQuestion) -> LearnedLaw:
     bench = bench_with(question, "ridelog learn")
     found = learned(bench, question.progress)
     summary = as_json(found.learning, found.addition, None)
-    drawn = picture_of(found)
+    drawn, known = picture_of(found), found.learning.diagnosis
     return LearnedLaw(
         Blocks(law_blocks(found)), summary, _steps(found.learning, found.addition), summary["noise_floor_error"], found,
         bench.model.vehicle.name,
         summary["family"], summary["words"], source_of(found.learning, found.addition), summary["parameters"],
         summary["standard_errors"], summary["error_before"], summary["error_after"], summary["error_after_unseen"],
-        tuple(summary["verdict"]), () if drawn is None else (drawn,))
+        tuple(summary["verdict"]), () if drawn is None else (drawn,),
+        "" if known is None else addition_words(question, bench, known))
 
 
 def learned(bench: Bench, notify: Notify = silent) -> LearnedModel:

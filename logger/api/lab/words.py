@@ -158,7 +158,7 @@ def error_words(steps: Sequence[ErrorStep], floor: float, of: str = f"on {JUDGED
     lines = [f"NRMSE {of}: {each}. Noise floor: about {error_and_fit(floor)}."]
     if rises := rising(steps):
         said = enumerated([_ERROR_WORDS.get(one, one) for one in rises], "and")
-        lines.append(f"It rises {said}: what fits a part of the data need not fit the rest. On roads a fit also "
+        lines.append(f"It rises {said}: what fits a part of the data need not fit the rest. A fit also "
                      "weights each frequency by its noise, while the NRMSE counts all equally.")
     return lines
 

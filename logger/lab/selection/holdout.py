@@ -135,6 +135,6 @@ class ErrorStep(NamedTuple):
 
 
 def rising(steps: Sequence[ErrorStep]) -> list[str]:
-    """What was done in those steps that raise the error by more than a rounding."""
+    """What was done in those steps that raise the error by more than a rounding, and as it is printed."""
     return [now.words for before, now in pairwise(steps)
-            if now.error > (1 + AS_PRINTED) * before.error]
+            if round(now.error, 3) > round((1 + AS_PRINTED) * before.error, 3)]
