@@ -6,7 +6,7 @@ import numpy as np
 
 from logger.arrays import Array
 
-MOST_POINTS = 4000
+MOST_POINTS, MOST_DOTS = 4000, 2000
 CURVE_POINTS, CURVE_REACH = 201, 0.999
 """Of a force curve: points that look smooth at the width of a page, and the share of the time that motions stay within
 its ends."""

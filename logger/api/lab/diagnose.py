@@ -18,7 +18,7 @@ from logger.api.lab.checks import check_distances, check_record, driven_parts, t
 from logger.api.lab.compare import forces_section, spectra
 from logger.api.lab.question import DiagnoseQuestion, LabQuestion
 from logger.api.shared_fields import each
-from logger.chart_data import Array, Bars, Curves, Line
+from logger.chart_data import MOST_DOTS, Array, Bars, Curves, Line
 from logger.errors import BadInput
 from logger.extraction.along_track import MeasuredLine
 from logger.lab.diagnosis import LabDiagnosis
@@ -517,6 +517,7 @@ def diagnosis_blocks(found: LabDiagnosis, most: int | None) -> Iterator[Block]:
     """What a person reads of a diagnosis; at a terminal ``most`` so many candidates, None: all."""
     yield _tiles(found)
     yield from diagnosis_summary(found)
+    yield from bench_sections(found)
     yield lab_words.removed_section(found.removed, found.band)
     yield from shape_sections(found)
     yield lab_words.steps_section(found.steps, found.noise_floor_error)
@@ -579,9 +580,22 @@ def car_sections(found: LabDiagnosis) -> list[Section]:
         Detail("The car's parameters", [bars, Table(
             ("Parameter", "Shift", "Known to (standard deviation)", ""), rows, (0, 3)), Hint(
             "A parameter that moves far may stand in for an effect that ridelog does not know.")] if rows else []),
-        Detail("Springs and dampers", [*map(_force, found.car.curves), Hint(
+        *([Detail("Springs and dampers", [*map(_force, found.car.curves), Hint(
             "Over the range that the model's suspensions reach in 99.9 % of these runs, without forces that have a "
-            "memory.")])]
+            "memory.")])] if found.car.on_bench is None else [])]
+
+
+def bench_sections(found: LabDiagnosis) -> list[Section]:
+    """What every bench draws of a part: its force over the velocity and over the travel, sample by sample."""
+    if found.car is None or (part := found.car.on_bench) is None:
+        return []
+    few = -(-len(part.travel_m) // MOST_DOTS)
+    return [Section("Force by velocity and by travel", [
+        Curves(f"Force by {name}", f"{name} [{unit}], positive in extension", "force [N]", tuple(
+            Line(words, at[::step], force_n[::step], dots=True)  # fewer of the model, so that both are seen
+            for words, step, force_n in (("measured", few, part.measured_n), ("file unchanged", 3 * few, part.before_n),
+                                         ("refitted", 3 * few, part.after_n))))
+        for name, unit, at in (("velocity", "m/s", part.rate_mps), ("travel", "mm", 1000 * part.travel_m))])]
 
 
 def _force(one: ForceCurve) -> Curves:

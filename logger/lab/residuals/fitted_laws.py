@@ -1,4 +1,5 @@
-"""The fitted car: by how much its numbers changed, and the force curves of its springs and dampers."""
+"""The fitted car: by how much its numbers changed, and the force curves of its springs and dampers; of a part alone on
+its bench the forces themselves."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -32,12 +33,25 @@ class ForceCurve:
 
 
 @dataclass(frozen=True, eq=False)
+class BenchForces:
+    """The force of a part in all samples (n,) of its runs [N], at these travels and rates: as it was measured, by the
+    vehicle's file, and as fitted."""
+
+    travel_m: Array
+    rate_mps: Array
+    measured_n: Array
+    before_n: Array
+    after_n: Array
+
+
+@dataclass(frozen=True, eq=False)
 class FittedCar:
     """moved: the relative change of each of the car's numbers, and the standard deviation that it was known to; curves:
-    of suspensions whose laws differ from the file's."""
+    of suspensions whose laws differ from the file's; on_bench: of a part alone, None: it is none."""
 
     moved: Mapping[str, tuple[float, float]]
     curves: tuple[ForceCurve, ...]
+    on_bench: BenchForces | None = None
 
 
 def fitted_car(posterior: Posterior, stood: State, found: State) -> FittedCar:
@@ -46,9 +60,15 @@ def fitted_car(posterior: Posterior, stood: State, found: State) -> FittedCar:
     moved = {name: (float(np.expm1(log)), float(deviation)) for name, log, deviation in zip(
         prior.names, found.logs, prior.deviations, strict=True)}
     before, after = (posterior.car(one.effects, one.logs) for one in (stood, found))
-    if not after.bends_laws:
+    if not (after.bends_laws or after.structure.held):
         return FittedCar(moved, ())
     responses = posterior.runs.respond(after, posterior.distance_error_m(found.record))
+    if after.structure.held:
+        samples = [np.stack([response.travel_m[:, 0], response.rate_mps[:, 0], run.measured_mps2,
+                             *(run.main(one) for one in by)])[:, run.first:]
+                   for run, response, *by in zip(posterior.runs.runs, responses, stood.predictions, found.predictions,
+                                                 strict=True)]
+        return FittedCar(moved, (), BenchForces(*np.concatenate(samples, axis=1)))
     curves = []
     for motion, name in ((RATE, "rate_mps"), (TRAVEL, "travel_m")):
         size = np.concatenate([np.abs(getattr(one, name)[run.first:]) for run, one in zip(
