@@ -5,6 +5,10 @@ at 500 samples a second are 12 mm/s, and a damper that rubs looks as if its forc
 as loud at all frequencies, what moves is not. A plateau at the bottom of the spectrum is noise; each frequency keeps
 the share of its power that lies above it (N. Wiener, Extrapolation, Interpolation, and Smoothing of Stationary Time
 Series, 1949). Where the spectrum has no plateau nothing is changed.
+
+A hum is no plateau, and a record of a second shows none. But what answers the motion tells (``answered``): where a part
+whose ends a bench moves pulls with far less than its stiffness and damping make of the samples, and not in step with
+them either, they hold noise.
 """
 
 from collections.abc import Iterable
@@ -23,6 +27,10 @@ _MOST_SHARE = 0.03
 that was made so, as white noise is on shakers. A judgement."""
 _NEAR = 20
 """The power at a frequency is the mean of so many on either side, of half a period of the record each."""
+_UNANSWERED, _IN_STEP, _FAR_LESS = 0.25, 0.5, 1e-3
+"""Noise has less than so much of the answer's power that it would have as a motion, and less than that coherence with
+it; with far less it is noise though a hum is coherent with its own trace: a thousandth of the power is lost at most.
+Judgements. (A spring that a damper works through takes as much from a motion, but leaves it in step.)"""
 EQUAL_SIGMA = 2.5
 """Bands are equally loud up to so many standard deviations of their difference: of 20 bands of noise one is louder by
 chance in eight cases (normal distribution, one-sided)."""
@@ -61,14 +69,35 @@ class Denoised:
         return _odd_samples(drawn * np.sqrt(self.gain))
 
 
-def without_white_noise(samples: Array) -> Denoised:
-    """Samples (n,) without their white noise."""
+def answered(samples: Array, answer: Array, rate_hz: float, up_to_hz: float) -> Array:
+    """Shares (n,) of the amplitudes of samples (n,), by frequency as ``Denoised``'s, that may be motion, given the
+    force (n,) with which a spring and a damper, or what is like them, answer it; all of them above ``up_to_hz``."""
     count = len(samples)
-    as_they_are = Denoised(samples, 0.0, np.zeros(count))
-    if count <= _BANDS * _NEAR:
-        return as_they_are
+    f_hz = np.fft.rfftfreq(count, 1 / rate_hz)
+    moved, found = (np.fft.rfft(np.hanning(count) * (one - np.linspace(one[0], one[-1], count)))
+                    for one in (samples, answer))
+    stiff, damped = (float(np.vdot(one, found).real / np.vdot(one, one).real)
+                     for one in (moved, 2j * np.pi * f_hz * moved))
+    expected = (stiff + 2j * np.pi * f_hz * damped) * moved
+    power, own, cross = (_local(one, _NEAR // 2) for one in (
+        np.abs(expected) ** 2, np.abs(found) ** 2, expected.conj() * found))
+    tiny = np.finfo(float).tiny
+    share, in_step = own / (power + tiny), np.abs(cross) ** 2 / (power * own + tiny)
+    is_noise = (share < _UNANSWERED) & ((in_step < _IN_STEP) | (share < _FAR_LESS)) & (f_hz < up_to_hz)
+    gain = np.interp(np.arange(count) * rate_hz / (2 * (count - 1)), f_hz, np.where(is_noise, share, 1.0))
+    line = np.linspace(samples[0], samples[-1], count)
+    lost = _odd_samples(_spectrum(samples - line) * (1 - gain))
+    return gain if lost.std() <= _MOST_SHARE * samples.std() else np.ones(count)
+
+
+def without_white_noise(samples: Array, most: Array | None = None) -> Denoised:
+    """Samples (n,) without their white noise, and no more of each frequency than ``most`` says (n,)."""
+    count = len(samples)
     line = np.linspace(samples[0], samples[-1], count)
     spectrum = _spectrum(samples - line)
+    as_they_are = Denoised(samples if most is None else line + _odd_samples(spectrum * most), 0.0, np.zeros(count))
+    if count <= _BANDS * _NEAR:
+        return as_they_are
     power = np.abs(spectrum)**2 / (2 * count)
     bands = np.array_split(power[1:], _BANDS)
     # A spectrum of an odd curve has one number at each frequency.
@@ -76,11 +105,16 @@ def without_white_noise(samples: Array) -> Denoised:
     noise, freedom = pooled(levels[1:], *levels[0], OF_QUIETEST)
     if freedom < _LEAST_BANDS * levels[0][1] or not 0 < noise <= _MOST_SHARE**2 * float(power[1:].mean()):
         return as_they_are
-    width = 2 * _NEAR + 1
-    local = np.convolve(np.pad(power, _NEAR, mode="reflect"), np.full(width, 1 / width), mode="valid")
-    is_above = local > noise * (1 + CONFLICT_SIGMA * np.sqrt(2 / width))
+    local = _local(power, _NEAR)
+    is_above = local > noise * (1 + CONFLICT_SIGMA * np.sqrt(2 / (2 * _NEAR + 1)))
     gain = np.where(is_above, 1 - noise / np.maximum(local, noise), 0.0)
+    gain = gain if most is None else np.minimum(gain, most)
     return Denoised(line + _odd_samples(spectrum * gain), float(np.sqrt(noise)), gain)
+
+
+def _local(values: Array | Complex, near: int) -> Array:
+    """The mean of each of some values (k,) and of so many on either side."""
+    return np.convolve(np.pad(values, near, mode="reflect"), np.full(2 * near + 1, 1 / (2 * near + 1)), mode="valid")
 
 
 def _spectrum(samples: Array) -> Complex:

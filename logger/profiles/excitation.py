@@ -16,7 +16,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from logger.arrays import Array
-from logger.dsp.white_noise import Denoised, without_white_noise
+from logger.dsp.white_noise import Denoised, answered, without_white_noise
+from logger.dsp.whole_record import SEEN_OF_RATE
 from logger.profiles.track import Alterations, Stance, Way
 
 if TYPE_CHECKING:
@@ -50,6 +51,7 @@ class Excitation:
     force_n        (n, f) [N]; None: there are none
     forces         what each of them acts on
     moves_part     the elevations are how much longer a part is than at its rest, whose ends the bench moves
+    share          of their amplitudes that may be motion (n,), as ``white_noise.answered``; None: all
 
     ValueError for a rate that is not above 0, samples that are not finite or of another shape, or fewer than four.
     """
@@ -60,6 +62,7 @@ class Excitation:
     force_n: Array | None = None
     forces: tuple[AppliedForce, ...] = ()
     moves_part: bool = False
+    share: Array | None = None
 
     timed = True
     two_tracks = False
@@ -119,8 +122,17 @@ class Excitation:
         """The same with noise like what is still in it, one draw of that by its numbers."""
         moved = [one.samples + one.left(*draw, 0, at) for at, one in enumerate(self._denoised_m)]
         pushed = [one.samples + one.left(*draw, 1, at) for at, one in enumerate(self._denoised_n)]
-        return replace(self, elevation_m=np.stack(moved, axis=1).reshape(self.elevation_m.shape),
+        return replace(self, elevation_m=np.stack(moved, axis=1).reshape(self.elevation_m.shape), share=None,
                        force_n=np.stack(pushed, axis=1) if pushed else None)
+
+    def answered_by(self, force_n: Array, rate_hz: float) -> Excitation:
+        """The same of a part, without what the force (m,) with which it answers shows to be noise."""
+        if not self.moves_part or len(force_n) < FEWEST:
+            return self
+        at_s = self.start_s + np.arange(len(self.elevation_m)) / self.rate_hz
+        force = np.interp(at_s, np.arange(len(force_n)) / rate_hz, force_n)
+        share = answered(self.elevation_m.ravel(), force, self.rate_hz, SEEN_OF_RATE * rate_hz)
+        return self if share.min() == 1 else replace(self, share=share)
 
     def times(self, table: float, forces: float) -> Excitation:
         """The same, the table's motion larger by a factor, and the forces by another."""
@@ -129,7 +141,7 @@ class Excitation:
 
     @cached_property
     def _denoised_m(self) -> list[Denoised]:
-        return [without_white_noise(one) for one in self.elevation_m.reshape(len(self.elevation_m), -1).T]
+        return [without_white_noise(one, self.share) for one in self.elevation_m.reshape(len(self.elevation_m), -1).T]
 
     @cached_property
     def _denoised_n(self) -> list[Denoised]:

@@ -52,3 +52,41 @@ def test_what_moves_is_left_as_it_is(samples: np.ndarray) -> None:
     found = without_white_noise(samples)
     assert found.deviation == 0.0
     assert found.samples is samples
+
+
+def _digressive(velocity_mps: np.ndarray, rate_hz: float, oil_n_per_m: float = 1.2e5) -> np.ndarray:
+    """Force of a damper whose slope halves above 50 mm/s, through the spring of its oil, by steps of a hundredth."""
+    fine_s = np.arange(100 * len(velocity_mps)) / (100 * rate_hz)
+    force_n = np.zeros(len(fine_s))
+    for at, v in enumerate(np.interp(fine_s, np.arange(len(velocity_mps)) / rate_hz, velocity_mps)[:-1]):
+        size = abs(force_n[at])
+        flow = np.sign(force_n[at]) * (min(size, 75.0) / 1500 + max(size - 75.0, 0.0) / 750)
+        force_n[at + 1] = force_n[at] + (v - flow) * oil_n_per_m / (100 * rate_hz)
+    return force_n[::100]
+
+
+@pytest.mark.parametrize(("hum_m", "shakes_m", "noise_m"), [
+    pytest.param(6e-5, 0.0, 1.5e-5, id="hum and noise go"),
+    pytest.param(0.0, 6e-5, 0.0, id="a vibration stays, though an oil spring leaves a third of it"),
+    pytest.param(0.0, 0.0, 0.0, id="nothing to take out"),
+])
+def test_what_a_damper_does_not_answer_is_noise(hum_m: float, shakes_m: float, noise_m: float) -> None:
+    rate_hz, count = 150.0, 180  # 1.2 s: of white noise alone nothing is seen in so short a record
+    time_s = np.arange(count) / rate_hz
+    hum, stroke = 2 * np.pi * 51.0 * time_s, 2 * np.pi * 1.1 * time_s
+    moves_m = 0.018 * np.cos(stroke) + shakes_m * np.sin(hum)
+    moves_mps = -0.018 * 2 * np.pi * 1.1 * np.sin(stroke) + shakes_m * 2 * np.pi * 51.0 * np.cos(hum)
+    read_m = moves_m + hum_m * np.sin(hum) + noise_m * np.random.default_rng(6).standard_normal(count)
+    force_n = _digressive(moves_mps, rate_hz) + 0.3 * np.random.default_rng(7).standard_normal(count)
+    excitation = Excitation(rate_hz, read_m, moves_part=True)
+    stance = SimpleNamespace(behind_m=np.zeros(1), left_m=np.zeros(1), contact_patch_m=0.0, on_base=True)
+
+    def velocity_mps(one: Excitation) -> np.ndarray:
+        return one.under_wheels(Way(np.zeros_like(time_s), time_s), stance)[0][15:-15, 1]
+
+    as_read, answered = velocity_mps(excitation), velocity_mps(excitation.answered_by(force_n, rate_hz))
+    off_mps, left_mps = (float(np.std(one - moves_mps[15:-15])) for one in (as_read, answered))
+    if hum_m:
+        assert off_mps > 0.011 > 0.004 > left_mps
+    else:
+        assert np.abs(answered - as_read).max() < 1e-5

@@ -455,22 +455,25 @@ def driven_stretches(drive: Drive, shortest_s: float = LEAST_S) -> list[Run]:
     """The parts of a drive in which the car moved, or it is known what drove the rig, and there were readings
     (``driven_parts``), each a run. A part says in its name which seconds it is of. BadInput as ``driven_parts``."""
     driven = None
-    assert drive.track is not None
-    if isinstance(drive.track, Excitation):
+    track = drive.track
+    assert track is not None
+    if isinstance(track, Excitation):
         near_s, time_s = 0.5 / drive.rate_hz, drive.time_s - drive.time_s[0]
-        driven = (time_s > drive.track.start_s - near_s) & (time_s < drive.track.end_s + near_s)
+        driven = (time_s > track.start_s - near_s) & (time_s < track.end_s + near_s)
+        if drive.facts.main.measures == "force" and drive.marks() is None:
+            track = track.answered_by(drive.accel_z_mps2, drive.rate_hz)
     parts = driven_parts(drive, driven, shortest_s)
     whole = len(parts) == 1 and parts[0] == slice(0, len(drive.time_s))
     cut = LeftOut((len(drive.time_s) - sum(part.stop - part.start for part in parts)) / drive.rate_hz, "s",
                   "without excitation or readings")
     def main(part: slice) -> Array:
         samples = drive.accel_z_mps2[part]
-        return samples if zero_is_known(drive.facts.main, drive.track) else samples - samples.mean()
+        return samples if zero_is_known(drive.facts.main, track) else samples - samples.mean()
 
     runs = [Run(str(drive.path) if whole else
                 f"{drive.path} ({drive.time_s[part.start]:.0f} to {drive.time_s[part.stop - 1]:.0f} s)",
                 drive.rate_hz, main(part), drive.distance_m[part], drive.speed_mps[part],
-                drive.track.begun(part.start / drive.rate_hz), past_of(drive.track).value, facts=drive.facts,
+                track.begun(part.start / drive.rate_hz), past_of(track).value, facts=drive.facts,
                 usable=drive.marks(part), more=_more(drive, part),
                 left_out=(*([cut] if part is parts[0] else []), *no_readings(drive.marks(part))))
             for part in parts]
