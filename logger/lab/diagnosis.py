@@ -127,6 +127,7 @@ class LabDiagnosis:
     car                  numbers and laws as fitted
     coloured             whether the noise has a colour: it is louder at some frequencies than at the highest
     ends                 of how many starts the fit of an effect ended at the best, by name; where numbers are not known
+    not_searched         what the search stopped before, as it had simulated as much as it may
     contradicted         numbers that the runs took so far beyond their tolerance that all were taken to be unknown
     tolerance            share by which the car's masses, springs and dampers may well be off
     no_better            names of the other effects that were tried
@@ -162,6 +163,7 @@ class LabDiagnosis:
     left_open: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     ends: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     contradicted: tuple[str, ...] = ()
+    not_searched: tuple[str, ...] = ()
     as_moved: Chosen | None = None
     best_linear: float | None = None
     shows_forces: bool = False
@@ -271,7 +273,10 @@ def search_to_the_last(posterior: Posterior, effects: Mapping[str, Effect], pres
     tried = {name: one for name, one in last.items() if name not in obstacles_of(posterior, last, present)}
     if not (tried and (found.diagnosis.exceeds_noise or found.diagnosis.within_calibration)):
         return found
-    progress(f"something is left unexplained: searching with {' and '.join(tried)}, too")
+    if search.stops_before(last_names := " and ".join(tried), 1.0):
+        return replace(found, diagnosis=replace(found.diagnosis, not_searched=(
+            *found.diagnosis.not_searched, last_names)))
+    progress(f"something is left unexplained: searching with {last_names}, too")
     search, selection = search.with_more(selection, [*tried.values()])
     if not {*selection.gains} & {*tried}:
         return found
@@ -306,6 +311,8 @@ def begin_search(posterior: Posterior, effects: Mapping[str, Effect], present: S
         # Of a part, whose motion is given, fits take a hundredth of those of a car.
         effort=SearchEffort(beginnings=2 * before.is_part) if unknown is None else SearchEffort(fitted=3),
         likelihood=unknown or MeasuredRoad())
+    if unknown is not None:
+        search.stops_before = unknown.stops_before
     return search, before
 
 
@@ -352,6 +359,7 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
             state.logs, errors.covariance, fine.shows_forces).items() if name not in {**beyond, **left_open}},
         left_open=left_open,
         ends=search.likelihood.ends if isinstance(search.likelihood, UnknownNumbers) else {},
+        not_searched=tuple(search.likelihood.not_tried) if isinstance(search.likelihood, UnknownNumbers) else (),
         as_moved=effect_as_moved(after, [one for one in tried if one.name not in state.names], left_open),
         steps=_steps(selection, posterior.error(nominal)),
         effects=errors.effects,

@@ -293,3 +293,10 @@ def test_the_object_says_what_is_left_and_what_was_not_seen(shape: Shape) -> Non
 def test_a_diagnosis_that_lacks_nothing_has_an_empty_verdict() -> None:
     reported = diagnosis_json(NOTHING)
     assert reported["verdict"] == [] and reported["unexplained"] is False and reported["unexplained_shape"] is None
+
+
+def test_what_a_search_did_not_try_is_said() -> None:
+    cut = replace(FOUND, not_searched=("one more effect", "hysteresis"))
+    assert "It did not try one more effect or hysteresis." in " ".join(diagnosis_summary(cut))
+    assert "cut short" not in " ".join(diagnosis_summary(FOUND))
+    assert diagnosis_json(cut)["not_searched"] == ["one more effect", "hysteresis"]

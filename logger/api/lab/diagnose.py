@@ -285,6 +285,9 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
     if found.contradicted:
         lines.append(f"The runs contradict the vehicle's file in {enumerated(found.contradicted, 'and')}. The search "
                      "therefore treated its parameters as unknown, except those with a stated tolerance.")
+    if found.not_searched:
+        lines.append("The search was cut short, as it had simulated as much as it may. It did not try "
+                     f"{enumerated(found.not_searched, 'or')}.")
     for one, group in zip(found.missing, groups(found), strict=True):
         lines += [_missing(found, one), *([_confusion(group, found)] if len(group) > 1 else [])]
     if not found.missing and not found.exceeds_noise:
@@ -459,7 +462,7 @@ def diagnosis_json(found: LabDiagnosis) -> dict[str, Any]:
         **_common_json(found), "residual_over_noise": 1 + max(found.excess, found.over_noise),
         "judged_on": JUDGED_ON, "groups": groups(found),
         "starts": {name: {"ended_there": there, "of": count} for name, (there, count) in found.ends.items()},
-        "contradicted": list(found.contradicted),
+        "contradicted": list(found.contradicted), "not_searched": list(found.not_searched),
         "beyond_tolerance": dict(found.beyond),
         "parameter_shifts": {name: {"share": share, "standard_error": error}
                           for name, (share, error) in found.moved.items()},

@@ -18,7 +18,6 @@ from logger.lab.likelihood.map_fit import CONVERGED, optimise_numbers, record_by
 from logger.lab.likelihood.noise_floor import repeat_each_other
 from logger.lab.likelihood.posterior import NotSimulated, Posterior, State
 from logger.lab.likelihood.signals import JointWhitener
-from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.effect import Chosen
 from logger.vehicle.named_parameters import free_parameters_of
 
@@ -34,8 +33,8 @@ class BySquares:
         runs = posterior.runs.runs
         self.kept, self.whole = kept, posterior
         self.posterior = posterior if len(kept) == len(runs) else Posterior(
-            SimulatedRuns([runs[one] for one in kept], posterior.runs.fine_hz), posterior.vehicle, posterior.tolerance,
-            posterior.start_vehicle, posterior.prior, [posterior.readings[one] for one in kept])
+            posterior.runs.some(kept), posterior.vehicle, posterior.tolerance, posterior.start_vehicle, posterior.prior,
+            [posterior.readings[one] for one in kept])
         self.whiteners = self._whiteners(1.0)
 
     @classmethod

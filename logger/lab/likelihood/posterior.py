@@ -73,6 +73,7 @@ class Posterior:
         counted = np.concatenate([run.kept_mps2[run.read[run.first:]] for run in runs.runs])
         self.size_mps2 = float(np.sqrt((counted**2).mean()))
         self.freedom = float(sum(one.freedom.sum() for one in self.bands))
+        self._inputs: dict[tuple[float, float], list[WheelTracks]] = {}
 
     @property
     def shows_forces(self) -> bool:
@@ -200,8 +201,10 @@ class Posterior:
                 for of_mass, move, driven in zip(slopes, moves, carried_gain, strict=True)]
 
     def _input_times(self, table: float, forces: float) -> list[WheelTracks]:
-        return [one.times(table, forces) if isinstance(one, Excitation) and (table != 1 or one.forces) else one
-                for one in (run.track for run in self.runs.runs)]
+        if (by := (table, forces)) not in self._inputs:  # simulations are prepared once for each such object
+            self._inputs[by] = [one.times(*by) if isinstance(one, Excitation) and (table != 1 or one.forces) else one
+                                for one in (run.track for run in self.runs.runs)]
+        return self._inputs[by]
 
     def _changed_by(self, state: State, tracks: Sequence[WheelTracks]) -> list[Array]:
         if all(one is run.track for one, run in zip(tracks, self.runs.runs, strict=True)):

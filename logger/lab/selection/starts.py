@@ -33,7 +33,7 @@ from logger.lab.selection.evidence import IMITATION, INDISTINGUISHABLE
 from logger.lab.selection.holdout import most_of
 from logger.lab.selection.screening import Baseline, Screened, Trial, effects_without
 from logger.lab.selection.stepwise import MeasuredRoad, Progress, is_outside_data
-from logger.simulation.virtual_drive import SEARCH_HZ
+from logger.simulation.virtual_drive import SEARCH_HZ, SimulatedRuns
 from logger.vehicle.effect import Chosen, Effect, Misalignment, Sought, chosen
 from logger.vehicle.models import structure_of
 from logger.vehicle.modes import undamped_frequencies_hz
@@ -68,21 +68,40 @@ class Started(Screened):
 class UnknownNumbers(MeasuredRoad):
     """The likelihood of drives over a measured road, of a car whose numbers are not known.
 
-    draws     cars that are drawn for each effect
-    starts    so many of each kind of them, the best, are improved to the end
-    ends      of how many of these the fit of an effect ended at the best, by name
+    draws        cars that are drawn for each effect
+    starts       so many of each kind of them, the best, are improved to the end
+    most         work of simulations (``SimulatedRuns.work``) after which a search takes no further step: about 80 s of
+                 a processor. A round draws cars until three quarters of it are done or, where they are, a sixth more.
+                 Judgements
+    ends         of how many of these the fit of an effect ended at the best, by name
+    not_tried    what a search stopped before
     """
 
     draws: int = 120
     starts: int = 2
+    most: float = 8e8
     ends: dict[str, tuple[int, int]] = field(default_factory=dict)
+    not_tried: list[str] = field(default_factory=list)
+    _runs: SimulatedRuns | None = None
+    _begun: int = 0
     _squares: dict[int, tuple[Posterior, BySquares]] = field(default_factory=dict)
     _ended: dict[frozenset[str], Sequence[_Drawn]] = field(default_factory=dict)
     _reconsidered: tuple[Baseline, State] | None = None
 
+    def stops_before(self, what: str, share: float = 1.0) -> bool:
+        """Whether a search has simulated this share of what it may, and does not try something."""
+        if (stops := self._done() > share * self.most) and what not in self.not_tried:
+            self.not_tried.append(what)
+        return stops
+
+    def _done(self) -> int:
+        return 0 if self._runs is None else self._runs.work - self._begun
+
     def fitted(self, posterior: Posterior, present: Sequence[Chosen], near: State | None = None) -> Baseline:
         """The model with some effects, fitted from where it is or else from the file's car, and from cars that are
         drawn."""
+        if self._runs is None:
+            self._runs, self._begun = posterior.runs, posterior.runs.work
         by_squares = self._by_squares(posterior)
         near = align(posterior, posterior.start(present)).state if near is None else near
         return Baseline.of(self._likeliest(
@@ -110,7 +129,12 @@ class UnknownNumbers(MeasuredRoad):
                 least = min(known, least)
                 numbers = best.logs if self._shows_the_car(by_squares, anchor, best) else None
         found: list[Screened] = []
+        enough, later = max(0.75 * self.most, self._done() + self.most / 6), list[str]()
         for one in local:
+            if self._done() > enough:
+                found.append(one)
+                later.append(one.effect.name)
+                continue
             drafted = one.effect.sought is Sought.NEVER  # by the motions of the records, as it begins
             drawn = [] if drafted else self._cars(by_squares, one.effect, anchor, one.trials, numbers)
             first, others = [some[0] for some in drawn], [each for some in drawn for each in some[1:]]
@@ -130,6 +154,8 @@ class UnknownNumbers(MeasuredRoad):
             if ends and ends[0][0] < least and not is_outside_data(base.posterior, ends[0][1].effects[-1]):
                 least, best = ends[0]
                 numbers = best.logs if self._shows_the_car(by_squares, anchor, best) else None
+        if later and (what := f"other starting points of {', '.join(sorted(later))}") not in self.not_tried:
+            self.not_tried.append(what)
         self._keep(*(one.ends for one in found if isinstance(one, Started)))
         return sorted(found, key=lambda one: -one.gain)
 

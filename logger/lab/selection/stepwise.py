@@ -292,6 +292,7 @@ class SearchRound(Generic[P, F]):
 
 
 UNTRIED: SearchRound[Any, Any] = SearchRound((), ())
+_MORE, _OTHERS = "one more effect", "others in the place of what it had found"
 
 
 @dataclass(frozen=True, eq=False)
@@ -318,7 +319,11 @@ class Selection(Generic[M, P, F]):
 
 @dataclass(eq=False)
 class Search(Generic[M, P, F]):
-    """A search among effects, on models whose first ``present`` effects are given."""
+    """A search among effects, on models whose first ``present`` effects are given.
+
+    stops_before    whether this share of all that a search may do is done, so that it does not try something
+    share           that this one may do; a quarter is kept for effects that are tried last
+    """
 
     effects: Sequence[Effect]
     present: int
@@ -327,6 +332,8 @@ class Search(Generic[M, P, F]):
     workers: int = 2
     effort: SearchEffort = SearchEffort()
     likelihood: Likelihood[Any, Any, Any] = field(default_factory=MeasuredRoad)
+    stops_before: Callable[[str, float], bool] = lambda what, share: False
+    share: float = 0.75
     _promising: set[str] = field(default_factory=set)
     _rivals: dict[str, tuple[str, ...]] = field(default_factory=dict)
     _reduced: tuple[M, dict[str, M]] | None = None
@@ -349,7 +356,7 @@ class Search(Generic[M, P, F]):
         may imitate others together: these are sought without that effect, and taken where they are likelier."""
         found = self._begun_otherwise(self._begun(before))
         refined = [one.effect for one in found.now.effects[self.present:] if not one.is_plain]
-        if not refined or not self._leaves_more_than_noise(found.now):
+        if not refined or not self._leaves_more_than_noise(found.now) or self.stops_before(_OTHERS, self.share):
             return found
         self.progress(f"is it {' and '.join(one.name for one in refined)}, or others together?")
         rest = replace(self, effects=[one for one in self.effects if one not in refined], _promising=set(), _rivals={})
@@ -395,7 +402,7 @@ class Search(Generic[M, P, F]):
         last, asked = begun.last, set[str]()
         while len((now := self._refined(now)).effects) - self.present < self.effort.effects:
             untried = [one for one in self.effects if one.name not in names_of(now)]
-            if not untried:
+            if not untried or (len(steps) > len(begun.steps) and self.stops_before(_MORE, self.share)):
                 break
             self.progress(f"round {len(steps) + 1}")
             new = [one.effect.name for one in now.effects[self.present:]
@@ -448,7 +455,7 @@ class Search(Generic[M, P, F]):
                   ) -> tuple[Search[M, P, F], Selection[M, P, F]]:
         """A search that has ended, gone on with more effects. These are tried on the model that it began with and on
         the one that it ended with, and in the place of what it found; what was tried before is not tried again."""
-        wider = replace(self, effects=[*self.effects, *more], _promising=set(), _rivals=dict(begun.rivals))
+        wider = replace(self, effects=[*self.effects, *more], share=1.0, _promising=set(), _rivals=dict(begun.rivals))
         before, now = begun.before, begun.now
         first = wider.round(before, more, beside=begun.first)
         best = wider._simplest(before, first)
@@ -687,7 +694,7 @@ class Search(Generic[M, P, F]):
         here = next(one for one in now.effects if one.effect.name == name)
         may_be = [one for one in self.effects if one.name not in names_of(now) and (
             shared_parameters(one, here.values) or (added_to is None and one.name in self._promising))]
-        if not may_be and added_to is not None:
+        if not may_be if added_to is not None else self.stops_before(_OTHERS, self.share):
             return now
         self.progress(f"fitting {name} again" if added_to is None else
                       f"is it {name}, or {' or '.join(one.name for one in may_be)}?")

@@ -286,6 +286,14 @@ def test_what_refinements_imitate_together_is_found_without_their_effect_unless_
     assert [*sought.run(Made()).gains] == named
 
 
+def test_a_search_that_stops_keeps_what_it_has_found() -> None:
+    sought, asked = search(), list[str]()
+    sought.stops_before = lambda what, share: asked.append(what) or True  # type: ignore[func-returns-value]
+    assert [*sought.run(Made()).gains] == ["sensor_gain"] and asked == ["one more effect"]
+    sought.stops_before = lambda what, share: share < 1 and "place" in what
+    assert [*sought.run(Made()).gains] == [*search().run(Made()).gains]
+
+
 class Slow(MadeUp):
     """Friction whose refinements gain most of all, and by a rough fit hardly more than its plain form: next to nothing.
     The others are doubtful."""

@@ -72,6 +72,24 @@ def test_a_start_ends_early_where_it_cannot_reach_another_at_its_pace() -> None:
 
 
 @pytest.mark.slow
+def test_a_search_that_has_simulated_as_much_as_it_may_draws_no_more_cars_and_says_so() -> None:
+    posterior = posterior_of(secret_runs([hidden("dry_friction", friction_force_n=200.0)], lasts_s=4.0),
+                             tolerance=Tolerance(numbers=0.5))
+    effects = [EFFECTS[name] for name in ("dry_friction", "tire_damping", "sensor_gain")]
+    drawn = []
+    for most in (1e5, 1e12):
+        search = UnknownNumbers(draws=8, most=most)
+        base = search.fitted(posterior, ())
+        with ThreadPoolExecutor(1) as pool:
+            found = search.screened(base, effects, Misalignment(1.0, 0.0), None, pool, lambda words: None)
+        drawn.append({one.effect.name for one in found if isinstance(one, Started)})
+        left_out = ", ".join(sorted({one.name for one in effects} - {"dry_friction"}))
+        assert search.stops_before("one more effect") == (most == 1e5)
+        assert search.not_tried == [f"other starting points of {left_out}", "one more effect"] * (most == 1e5)
+    assert drawn[0] == {"dry_friction"} < drawn[1]
+
+
+@pytest.mark.slow
 def test_more_starts_are_improved_until_two_end_alike_and_what_ends_at_the_model_that_is_there_is_left_out(
         monkeypatch: pytest.MonkeyPatch) -> None:
     bracket, still = hidden("sensor_mount_resonance", frequency_hz=14.0, damping_ratio=0.1), Misalignment(1.0, 0.0)
