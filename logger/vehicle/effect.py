@@ -164,12 +164,14 @@ class Misalignment:
     delay_s    how late the acceleration is, were that all [s]
     low_pass   cut-off [Hz] and order of a filter that the record seems to have gone through; None: none
     rate_hz    samples a second of the record; 0: it does not matter
+    thinned    whether it had more when it was recorded
     """
 
     scale: float
     delay_s: float
     low_pass: tuple[float, int] | None = None
     rate_hz: float = 0.0
+    thinned: bool = False
 
 
 def resonances_hz(low_hz: float, high_hz: float, damping_ratio: float) -> tuple[float, ...]:

@@ -37,7 +37,7 @@ from logger.store.formats import effect_file
 from logger.store.formats.effect_file import check_on, effect_named, own_effect
 from logger.store.formats.vehicle_file import CarModel, ModelStep
 from logger.vehicle.compose import compose
-from logger.vehicle.effect import Chosen, Effect, ForceEffect, SensorEffect, Sought, chosen
+from logger.vehicle.effect import Chosen, Effect, ForceEffect, SensorEffect, Sought, VehicleEffect, chosen
 from logger.vehicle.uncertain import Known, Scales, sized
 from logger.vehicle.vehicle import OWN_NAMES
 
@@ -305,6 +305,8 @@ def _shown_on_rig(effect: Effect, of_part: bool) -> Effect:
     found, units = copy(effect), [one.name.partition("_per_")[2] for one in effect.parameters]
     if not of_part:
         found.shown_by = ("excite it well above its natural frequencies" if isinstance(effect, SensorEffect) else
+                          "weigh it, each end by itself, and measure where the sensor sits"
+                          if isinstance(effect, VehicleEffect) else
                           "move it faster and farther, at several amplitudes, through its natural frequencies")
     elif any(unit in ("s", "m2") for unit in units):
         found.shown_by = "move it at one amplitude, at rates far below, near and far above where its force changes"

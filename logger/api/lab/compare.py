@@ -191,7 +191,8 @@ def headline(found: LabComparison) -> list[str]:
     residual, measured = (rms(one) for one in (plain.residuals.residual, plain.residuals.measured))
     unit = plain.residuals.unit
     lines = [f"NRMSE {plain.error:.3f} (residual {residual:.3g} over measured {measured:.3g} {unit} r.m.s.)."]
-    refit = "A refit of masses, springs, dampers and distances within their tolerance"
+    parts = ["masses", "springs", "dampers", *["distances"] * (not are_on_rig(plain.residuals.runs))]
+    refit = f"A refit of {enumerated(parts, 'and')} within their tolerance"
     if any(one.effect.parameters for one in found.effects):
         refit += ", and of the effects' parameters,"
     before, after = (one.error for one in found.steps)

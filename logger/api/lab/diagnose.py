@@ -564,7 +564,7 @@ def _tiles(found: LabDiagnosis) -> doc.Html:
     return doc.tiles([
         ("Missing", unknown if found.exceeds_noise or (found.unexplained and not missing) else count, ""),
         ("NRMSE, file unchanged", f"{found.baseline_error:.3f}", ""),
-        ("NRMSE with the missing effects" if missing else "NRMSE refitted", f"{found.final_error:.3f}", "refitted"),
+        ("NRMSE with the missing effects" if missing else "NRMSE refitted", f"{found.steps[-1].error:.3f}", JUDGED_ON),
         *lab_words.drift_tile(found.removed),
         ("Noise floor", f"{found.noise_floor_error:.3f}", "NRMSE"),
     ])
@@ -580,7 +580,7 @@ def car_sections(found: LabDiagnosis) -> list[Section]:
              "beyond its tolerance" if name in found.beyond else "")
             for name, (share, deviation) in found.car.moved.items()]
     return [
-        Detail("The car's parameters", [bars, Table(
+        Detail("The model's parameters", [bars, Table(
             ("Parameter", "Shift", "Known to (standard deviation)", ""), rows, (0, 3)), Hint(
             "A parameter that moves far may stand in for an effect that ridelog does not know.")] if rows else []),
         *([Detail("Springs and dampers", [*map(_force, found.car.curves), Hint(
@@ -616,7 +616,7 @@ def _where(shape: Shape) -> Detail:
     if shape.line is not None and shape.line.found:
         drawn.append(Curves(f"What repeats along the road, in {shape.line.run}", "spatial frequency [1/m]",
                             "power over its mean [1]", (Line("residual", shape.line.per_m, shape.line.power),)))
-    return Detail("By frequency and distance", drawn)
+    return Detail("By band" + " and distance" * (len(drawn) > 1), drawn)
 
 
 def same_road_summary(found: UnknownRoadDiagnosis) -> list[str]:

@@ -63,7 +63,7 @@ _REMOVED_WORDS = {
     RAMP: "a ramp of {size:.2g} m/s2 in total",
     STEP: "a step of {size:.2g} m/s2 at {time:.3g} s",
     EXPONENTIAL: "an exponential of {size:.2g} m/s2 with a time constant of {time:.2g} s",
-    WANDER: "a random walk, {size:.2g} m/s2 r.m.s.",
+    WANDER: "irregularly, {size:.2g} m/s2 r.m.s.",
 }
 HEADS = ("What", "Share of the residual's power", "")
 

@@ -345,7 +345,8 @@ class DirectionTest(ResidualTest):
         """Which one resists more."""
         damping = found.figures["damping"]
         more, less = ("rebound", "bump") if found.value > 0 else ("bump", "rebound")
-        ratio = f", by {percent(2 * abs(found.value) / damping)} of the model's damping" if damping > 0 else ""
+        by = 2 * abs(found.value)
+        ratio = f", by {by:.2g} N s/m" + (f" ({percent(by / damping)} of the model's damping)" if by < damping else "")
         return (f"The residual depends on the direction: the force {found.figures['acts']} resists {more} more than "
                 f"{less}{ratio}, which would explain {percent(found.figures['share'])} of it.")
 

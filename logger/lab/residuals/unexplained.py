@@ -13,7 +13,8 @@ or whose zero jumps, is strongest there, and an error counts that. Solution: the
 cosines below that frequency (discrete cosine transform, N. Ahmed, T. Natarajan and K. Rao, IEEE Transactions on
 Computers C-23, 1974). Of several forms of drift the one with the least BIC (G. Schwarz, Annals of Statistics 6, 1978)
 is chosen; the noise is white there, no less than between 0.4 and 0.6 Hz. The power of a random walk falls with the
-square of a coefficient's number; it is estimated by N. Wiener's filter.
+square of a coefficient's number; it is estimated by N. Wiener's filter. A random walk may look like any of the others,
+which therefore have to be clearly better (of faint ones over 20 s a third were called steps and ramps, now 3 %).
 
 Sensor drift, distance error and filtering: what is removed from an error before it is judged, and its share of it.
 
@@ -41,7 +42,13 @@ import numpy as np
 from logger.arrays import Array
 from logger.bounds import SURE_SIGMA, UNUSUAL_SIGMA
 from logger.lab.likelihood.distance_error import unusual_distance_error_m
-from logger.lab.likelihood.noise_floor import NoiseLevel, growing_power, sensor_noise_of
+from logger.lab.likelihood.noise_floor import (
+    NoiseLevel,
+    floor_error,
+    growing_power,
+    sensor_noise_of,
+    sensor_noise_with_rounding,
+)
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.signals import JointBands
 from logger.lab.likelihood.whittle import LOWEST_HZ, UNEXPLAINED
@@ -114,7 +121,10 @@ def drift_of(run: Run, residual: Array, noise_mps2: float) -> Drift:
     fits.append(_fit_random_walk(basis, seen[:count], level, run.first))
     nought = float(seen[:count] @ seen[:count]) / level
     best = min(fits, key=lambda one: one.bic)
-    if best.bic > nought + 2 * np.log(SIGNIFICANCE):  # noise lowers the criterion by so much no more often than that
+    clear = 2 * float(np.log(SIGNIFICANCE))  # noise lowers the criterion by so much no more often than that
+    if best.form != OFFSET and best.bic > fits[-1].bic + clear:  # an offset is a walk of no steps
+        best = fits[-1]
+    if best.bic > nought + clear:
         return nothing
     return Drift(run.name, best.form, best.size_mps2, best.time_s, best.curve(time_s), rate)
 
@@ -207,7 +217,8 @@ class Removed:
     drifts                                       of the runs' sensors, one each
     drift_share, distance_share, filter_share    of the residual power of the model as it stands, at all frequencies
     distance_error_m                             the largest distance error, if it is unusual; else 0
-    error                                        normalised r.m.s. error of the fitted model without the drifts
+    error                                        normalised r.m.s. error of the fitted model without the drifts, and the
+                                                 noise floor where the curves took some of the noise away
     """
 
     drifts: tuple[Drift, ...]
@@ -237,8 +248,8 @@ def removed_from(posterior: Posterior, plain: Sequence[Array], state: State) -> 
     fitted, whole = _power(runs, state.predictions), _power(runs, plain) + outside
     record = [error.without_distance_error(k) for error, k in zip(posterior.record_errors, state.record, strict=True)]
     at_recorded_distances = _power(runs, posterior.predict(state.effects, state.logs, record))
-    noise_mps2 = sensor_noise_of(posterior, state).deviation_mps2
-    drifts = tuple(drift_of(run, run.main(one), noise_mps2)
+    noise = sensor_noise_of(posterior, state)
+    drifts = tuple(drift_of(run, run.main(one), noise.deviation_mps2)
                    for run, one in zip(runs, posterior.without_rounding().residuals(state), strict=True))
     without_drift = _power(runs, [_with_drift(one, drift)
                                   for one, drift in zip(state.predictions, drifts, strict=True)])
@@ -249,9 +260,11 @@ def removed_from(posterior: Posterior, plain: Sequence[Array], state: State) -> 
         return float(min(max(power / whole, 0.0), 1.0)) if whole > 0 else 0.0
 
     measured = sum(float(run.kept_readings_mps2 @ run.kept_readings_mps2) for run in runs)
+    floor = floor_error(posterior, sensor_noise_with_rounding(posterior, state))
     return Removed(drifts, share(fitted - without_drift), share(at_recorded_distances - fitted), share(outside),
                    unusual_distance_error_m(posterior.record_errors, state.record),
-                   float(np.sqrt(without_drift / measured)) if measured > 0 else float("nan"))
+                   min(max(float(np.sqrt(without_drift / measured)), floor), float(np.sqrt(fitted / measured)))
+                   if measured > 0 else float("nan"))
 
 
 def _with_drift(prediction: Array, drift: Drift) -> Array:

@@ -79,6 +79,6 @@ def _fitted(search: Search, found: Selection) -> CandidateFit | None:
     """The filter fitted in the place of the slow sensor; None: it explains nothing."""
     base = search.without(found.now, _IMITATED_BY)
     rate_hz = base.posterior.runs.runs[0].rate_hz
-    screened = screen(base, _FILTER, [replace(search.misalignment, rate_hz=rate_hz)])
+    screened = screen(base, _FILTER, [replace(search.misalignment, rate_hz=rate_hz, thinned=False)])
     tries = [one for one in fit_roughly(base.score, base, screened) if one.gain > 0]
     return max((refine(base.score, one) for one in tries[:2]), key=lambda one: one.gain, default=None)

@@ -456,11 +456,13 @@ def misalignment(posterior: Posterior, state: State) -> Misalignment:
         delay_s if correlation(1.0, delay_s) > unshifted else 0.0, *_filter_of(posterior))
 
 
-def _filter_of(posterior: Posterior) -> tuple[tuple[float, int] | None, float]:
-    """Cut-off and order of the causal filter that was detected in the records (None: none), and their rate."""
+def _filter_of(posterior: Posterior) -> tuple[tuple[float, int] | None, float, bool]:
+    """Cut-off and order of the causal filter that was detected in the records (None: none), their rate, and whether the
+    lab thinned them to it."""
     runs = posterior.runs.runs
     causal = [run.low_pass for run in runs if run.low_pass is not None and run.low_pass.causal]
-    return (causal[0].cutoff_hz, round(causal[0].order)) if causal else None, runs[0].rate_hz
+    low_pass = (causal[0].cutoff_hz, round(causal[0].order)) if causal else None
+    return low_pass, runs[0].rate_hz, runs[0].thinned_by > 1
 
 
 def _grid_maximum(correlation: Callable[[float], float], reach: float, step: float) -> float:

@@ -4,7 +4,7 @@ Its low-pass of first order is 1 / (1 + s / w); of second order, Butterworth's 1
 higher orders are those of a filter that a program runs on the samples (``dsp.filters``). Such a one of low order
 too is another filter than a sensor's where its cut-off lies above a fifth or so of the sample rate: it takes all away
 at half of that, and nearly nothing where a sensor's takes some decibels. As a sensor's it would leave the difference,
-which looks like a resonance there.
+which looks like a resonance there. Of a record that was thinned, that lies above what is compared.
 """
 
 from collections.abc import Mapping
@@ -24,6 +24,11 @@ _LOWEST_HZ, _HIGHEST_OF_RATE, _CUTOFF_RATIO = 6.0, 0.45, 1.12
 # A cut-off that a spectrum shows and one that a delay shows differ by no larger factor: of a filter run on 100 samples
 # a second with 30 Hz, by tan(0.3 pi) / (0.3 pi) = 1.46.
 _NEAR = 1.5
+
+
+def _rates_hz(seen: Misalignment) -> list[float]:
+    """Of filters that are tried: 0 of a sensor's, and the sample rate."""
+    return [0.0, *[seen.rate_hz] * (not seen.thinned)]
 
 
 class SensorBandwidth(SensorEffect):
@@ -51,10 +56,11 @@ class SensorBandwidth(SensorEffect):
         found = super().trials(seen)
         if seen is None or not seen.rate_hz:
             return found
-        ways = [(_ON_SAMPLES * seen.rate_hz, order, seen.rate_hz) for order in (1, 2)]
+        rates_hz = _rates_hz(seen)
+        ways = [(_ON_SAMPLES * sampled_hz, order, sampled_hz) for sampled_hz in rates_hz[1:] for order in (1, 2)]
         if seen.low_pass is not None:
             cutoff_hz, order = seen.low_pass
-            ways += [(cutoff_hz, one, sampled_hz) for sampled_hz in (0.0, seen.rate_hz)
+            ways += [(cutoff_hz, one, sampled_hz) for sampled_hz in rates_hz
                      for one in range(max(order - 1, 1), min(order + 1, _HIGHEST) + 1)]
         return found + [{"cutoff_hz": float(one_hz), "order": float(one), "sampled_hz": float(sampled_hz)}
                         for one_hz, one, sampled_hz in ways]
@@ -68,7 +74,7 @@ class SensorBandwidth(SensorEffect):
         count = round(np.log(highest_hz / _LOWEST_HZ) / np.log(_CUTOFF_RATIO))
         cutoffs_hz = sorted([*np.geomspace(_LOWEST_HZ, highest_hz, count + 1), *(seen.low_pass or ())[:1]])[::-1]
         return [[{"cutoff_hz": float(cutoff_hz), "order": float(order), "sampled_hz": sampled_hz}
-                 for cutoff_hz in cutoffs_hz] for sampled_hz in (0.0, seen.rate_hz) for order in range(1, _HIGHEST + 1)]
+                 for cutoff_hz in cutoffs_hz] for sampled_hz in _rates_hz(seen) for order in range(1, _HIGHEST + 1)]
 
     def is_seen(self, values: Mapping[str, float], seen: Misalignment) -> bool:
         """Where the record has lost what lies above."""
