@@ -119,15 +119,12 @@ class SteadyMotion:
         return self.psd[:moved[-1] + 1] if len(moved) else self.psd[:1]
 
 
-def steady_motion(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, rate_hz: float, count: int,
-                  reads: int = 1) -> SteadyMotion:
-    """What such a road makes of the car, at the frequencies of ``count`` samples (even) that are read ``reads`` times
-    each: nothing above half the rate of the samples."""
+def steady_motion(car: CarResponse, speed_mps: float, spectrum: RoadSpectrum, rate_hz: float, count: int
+                  ) -> SteadyMotion:
+    """What such a road makes of the car, at the frequencies of ``count`` samples (even)."""
     per_hz = car.power(speed_mps) * spectrum.psd_of(LOG_WAVES) / speed_mps
     f_hz = frequencies_hz(count, rate_hz)
-    psd = np.zeros(count // 2 * reads + 1)
-    psd[:len(f_hz)] = np.interp(f_hz / speed_mps, WAVE_NUMBERS_CPM, per_hz, left=0.0, right=0.0)
-    return SteadyMotion(psd, rate_hz * reads)
+    return SteadyMotion(np.interp(f_hz / speed_mps, WAVE_NUMBERS_CPM, per_hz, left=0.0, right=0.0), rate_hz)
 
 
 @lru_cache(maxsize=32)

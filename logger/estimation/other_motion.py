@@ -25,7 +25,7 @@ _STEPS = 4
 
 
 class OtherMotion:
-    """In blocks of readings, one after another and all of one length.
+    """In blocks of readings, one after another and all of one length, one or more for each sample.
 
     motion_mps2    (count,) most probable one in this block; 0 where there is none
     psd            (f,) its spectrum, one-sided, at the block's frequencies [(m/s2)2/Hz]; None: there is none
@@ -62,7 +62,7 @@ class OtherMotion:
         count, mean_weight = len(weight), float(weight.mean())
 
         def weighed(row: Array) -> Complex:
-            return gain * np.fft.rfft(weight * row)
+            return gain * np.fft.rfft(weight * row)[:len(gain)]
 
         waves = np.zeros(len(gain), dtype=np.complex128)
         residual = weighed(residual_mps2)
@@ -85,17 +85,17 @@ class OtherMotion:
 
         residual_mps2    (count,) what the road leaves of the readings, this motion in it [m/s2]
         weight           (count,) one over their variance [(m/s2)-2], 0 where there are none
-        road             the motion that the road makes, at the rate of the readings
+        road             the motion that the road makes, at the frequencies of the samples
         """
-        self._rate_hz, road_psd = road.rate_hz, road.psd
-        count, span = len(weight), np.flatnonzero(weight)
+        count, span, road_psd = len(weight), np.flatnonzero(weight), road.psd
+        self._rate_hz = road.rate_hz * (count // (2 * len(road_psd) - 2))
         if len(span) < count // 2:
             return
-        f_hz = np.linspace(0.0, self._rate_hz / 2, len(road_psd))
+        f_hz = np.linspace(0.0, road.rate_hz / 2, len(road_psd))
         looked_at = (f_hz >= _LOWEST_HZ) & (f_hz <= HIGHEST_HZ)
         taper = np.zeros(count)
         taper[span[0]:span[-1] + 1] = np.hanning(int(span[-1] - span[0]) + 1)
-        fresh = np.abs(np.fft.rfft(weight * residual_mps2 * taper)) ** 2 / float(weight @ taper**2)
+        fresh = np.abs(np.fft.rfft(weight * residual_mps2 * taper)[:len(road_psd)]) ** 2 / float(weight @ taper**2)
         before = np.ones(len(fresh)) if self._power is None else self._power
         share = max(1 / (1 / _FIRST_TAKEN_OVER + self._heard), BLOCK_SHARE)
         self._power, self._heard = (1 - share) * before + share * fresh, self._heard + 1
@@ -115,4 +115,4 @@ class OtherMotion:
         total = 0.5 * (left + np.sqrt(left**2 + 4 * left * road_psd))
         self.psd = np.where(bands, np.maximum(total - usual * noise, 0.0), 0.0)
         both = self.psd * noise / (self.psd + noise)
-        self.variance_left = float(both.mean()) * self._rate_hz / 2
+        self.variance_left = float(both.mean()) * road.rate_hz / 2

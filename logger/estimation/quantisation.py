@@ -101,6 +101,17 @@ def cavity(motion: SteadyMotion, variance: Array) -> tuple[Array, Array]:
     return others, np.exp(np.interp(np.log(others), log_others, log_trials))
 
 
+def cavity_of_reads(motion: SteadyMotion, variance: Array, relative: Array) -> tuple[Array, Array]:
+    """The same (y,) for readings (y,), some of each sample (t,), of a motion whose variance is ``relative`` there (t,).
+
+    Reads of one sample say nearly the same, which is no small disorder: they count as one reading of all they say."""
+    reads = len(variance) // len(relative)
+    own = 1 / variance
+    of_sample = own.reshape(-1, reads).sum(axis=1)
+    others, even = (relative * row for row in cavity(motion, 1 / (of_sample * relative)))
+    return 1 / (np.repeat(1 / others, reads) + (np.repeat(of_sample, reads) - own)), np.repeat(even * reads, reads)
+
+
 def without_own(readings: GaussianReadings, fitted_mps2: Array, fitted_variance: Array | float) -> tuple[Array, Array]:
     """What all other readings say of each acceleration: mean [m/s2] and variance [(m/s2)2], (t,); as ``improved``."""
     taken_out = np.minimum(1 / readings.variance, _MOST_OWN / fitted_variance)

@@ -22,7 +22,7 @@ from logger.estimation.other_motion import OtherMotion
 from logger.estimation.quantisation import (
     GaussianReadings,
     bounds,
-    cavity,
+    cavity_of_reads,
     first_guess,
     improved,
     unexplained,
@@ -293,15 +293,15 @@ class FollowedRoad:
         mean_variance = 1 / float(weight[moving].mean()) if moving.any() else float(variance.mean())
         gain, ratio, free, even_share = solution.gain, np.ones(block.count), None, 1.0
         if self._is_coarse:
-            motion = steady_motion(block.car, block.mean_speed_mps, self._spectrum, RATE_HZ, len(samples), reads)
+            motion = steady_motion(block.car, block.mean_speed_mps, self._spectrum, RATE_HZ, len(samples))
             residual = readings.value_mps2 - solution.fitted_mps2
             if learns and is_last:
                 self._other.learn(residual, weight, motion)
             self._other.find(residual, weight)
             solution = replace(solution, fitted_mps2=solution.fitted_mps2 + self._other.motion_mps2)
             motion = self._other.beside(motion)
-            relative = np.repeat(block.felt(local), reads)  # motion as strong as where it was felt
-            others, even = (relative * row for row in cavity(motion, variance / relative))
+            relative = block.felt(local)  # motion as strong as where it was felt
+            others, even = cavity_of_reads(motion, variance, relative)
             self._centre_mps2 = float(solution.drift_mps2[-1])
             self._accel_variance = motion.variance * float(relative[-1])
             if moving.any():
@@ -355,9 +355,8 @@ class FollowedRoad:
             self._log_noise = with_noise(self._log_noise, residual, weight, resolved_waves)
             if learns and self._learner is not None:
                 self._learn_from_residual(noise_slope(residual, weight, resolved_waves), weight)
-        other_psd = None if self._other.psd is None else self._other.psd[:len(samples) // 2 + 1]
         return SolvedBlock(solution.road, (solution.fitted_mps2 - solution.drift_mps2)[::reads],
-                           mean_variance / reads / ratio, seen, np.exp(found), other_psd)
+                           mean_variance / reads / ratio, seen, np.exp(found), self._other.psd)
 
     def _as_gaussian(self, samples: RoadSamples) -> GaussianReadings:
         if not self._is_coarse:
