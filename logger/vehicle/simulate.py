@@ -108,7 +108,9 @@ class Passage:
         self._of_bench, each = of_bench, max(of_bench, 1)
         self.steps = each * max(1, int(np.ceil(fine_hz / (rate_hz * each) - EVEN_SAMPLES)))
         self.step_s = 1 / (rate_hz * self.steps)
-        self._lead = min(round(APPROACH_S * rate_hz), self.count) if is_free else round(APPROACH_S * rate_hz)
+        # What a bench moved is taken to have come the way it goes, and no farther than that is known.
+        known = self.count if is_free else self.count - 1 if of_bench else np.inf
+        self._lead = int(min(round(APPROACH_S * rate_hz), known))
         self._mirrored = self._lead if is_free else 0
         # What nothing drives is not early against anything.
         self._tail = max(round((_TAIL_S - APPROACH_S * is_free) * rate_hz), len(recorder_taps(1)) // 2 + 1)

@@ -1184,3 +1184,31 @@ def test_whether_a_record_of_two_signals_follows_its_force_is_seen_in_the_first(
     assert main(["compare", "--vehicle", vehicle, runs[0]]) == 0
     with pytest.raises(BadInput, match="is it another run's excitation"):
         main(["compare", "--vehicle", vehicle, runs[1]])
+
+
+def second_of_a_part(folder: Path, force: Callable[[Array, Array], Array]) -> Path:
+    """A record of 1.25 s that ends in the middle of a stroke; its force by travel and rate."""
+    folder.mkdir()
+    time_s = np.arange(150) / 120
+    travel_m, rate_mps = 0.02 * np.cos(9 * time_s) + 0.03, -0.18 * np.sin(9 * time_s)
+    for name, column, values in (("excitation.csv", "displacement_m", travel_m),
+                                 ("drive.csv", "force_n", force(travel_m, rate_mps))):
+        np.savetxt(folder / name, np.stack([time_s, values], axis=1), "%.9g", ",", header=f"t_s,{column}", comments="")
+    return folder
+
+
+def test_a_second_of_a_part_stands_where_its_bench_holds_it(tmp_path: Path) -> None:
+    """The approach of 2 s was longer than the record, and drifted off by centimetres: a stop stood elsewhere."""
+    run = second_of_a_part(tmp_path / "short", lambda travel_m, rate_mps: 90 * rate_mps + 2e6 * travel_m**3)
+    (tmp_path / "part.yaml").write_text(
+        "name: part\nmodel: component\nstiffness_n_per_m: 0\ndamping_n_s_per_m: 90\n"
+        "effects:\n- {name: progressive_spring, cubic_stiffness_n_per_m3: 2.0e+6}\n")
+    assert ridelog.compare(tmp_path / "part.yaml", [run]).error < 0.01
+
+
+def test_a_second_of_a_part_is_not_cut_to_a_band_as_most_of_it_would_be_lost(tmp_path: Path) -> None:
+    run = second_of_a_part(tmp_path / "short", lambda travel_m, rate_mps: 90 * rate_mps + 400 * travel_m)
+    (tmp_path / "part.yaml").write_text("name: part\nmodel: component\nstiffness_n_per_m: 400\n"
+                                        "damping_n_s_per_m: 80\n")
+    with pytest.raises(BadInput, match=r"a record of 1\.9 s or longer where its band is cut.*found 1\.3 s"):
+        main(["compare", "--vehicle", str(tmp_path / "part.yaml"), "--low-pass", "20", str(run)])

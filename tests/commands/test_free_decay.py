@@ -63,6 +63,14 @@ def test_nothing_is_left_out_and_nothing_is_missing(tmp_path: Path) -> None:
     assert "lacks nothing" in answer["evidence"][0]
 
 
+def test_a_decay_that_no_test_relates_to_its_motion_is_not_called_noise(tmp_path: Path) -> None:
+    """Friction that stops it after two swings, read in steps of 2 mm."""
+    run = decay(tmp_path / "run", lasts_s=1.0, friction_n=2.0, step_m=0.002)
+    answer = json.loads(called("compare", "--json", "--tolerance", "unknown", "--vehicle", tmp_path / "vehicle.yaml",
+                               run).stdout)
+    assert "it is no white noise" in answer["evidence"][0] and "ridelog diagnose" in answer["evidence"][-1]
+
+
 @pytest.mark.parametrize(("from_m", "repeats"), slow((-0.07, True), (-0.04, False)))
 def test_what_is_let_go_from_the_same_place_repeats(tmp_path: Path, from_m: float, repeats: bool) -> None:
     runs = decay(tmp_path / "one"), decay(tmp_path / "two", from_m=from_m, seed=4)

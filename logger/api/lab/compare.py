@@ -238,15 +238,21 @@ def conclusion(found: LabComparison) -> str:
     if found.missing:
         return ("The model lacks something: after a refit, the residual (measured - model) still depends on "
                 + ("the excitation and on the rig's motion." if on_rig else "the road and the car's motion."))
-    if found.tests_found and not all(test.test.of_placement for test in found.tests_found):
+    if _is_coloured(found):
         if on_rig:
-            return ("The model lacks no effect of the rig. The residual (measured - model) does not depend on the "
-                    "excitation; it looks like coloured noise of the sensor.")
+            return ("No test finds that the residual (measured - model) depends on the rig's motion, but it is no "
+                    "white noise: either the sensor's noise is coloured, or the model lacks what these tests do not "
+                    "see.")
         return ("The model lacks no effect of the car. The residual (measured - model) does not depend on the road; it "
                 "looks like coloured noise of the sensor or the engine.")
     removed = found.removed.drifting_sensors or found.removed.distance_error_m > 0
     beside = " apart from what was removed (shown below)" * bool(removed)
     return f"The model lacks nothing{beside}: after a refit, the residual (measured - model) is no more than noise."
+
+
+def _is_coloured(found: LabComparison) -> bool:
+    """Whether the residual is no white noise, by a test that is not of where the runs lie."""
+    return any(not test.test.of_placement for test in found.tests_found)
 
 
 def _explains_nothing(found: LabComparison) -> bool:
@@ -261,6 +267,8 @@ def next_step(found: LabComparison) -> str:
         return "Next: check the run's columns, signs and units; then ridelog diagnose with the same arguments."
     if not found.missing:
         on_rig = are_on_rig(found.refitted.residuals.runs)
+        if on_rig and _is_coloured(found):
+            return "Next: ridelog diagnose with the same arguments tries every known effect."
         harder = "Stronger motion or other frequencies" if on_rig else "Rougher roads or other speeds"
         return f"Next: nothing. {harder} would be a stronger test."
     if any(test.road for test in found.tests_found):

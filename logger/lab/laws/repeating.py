@@ -162,10 +162,12 @@ def tone_in_time(context: LawContext, hz: tuple[float, float], wanders: bool) ->
     """The strongest tone, with the same phase at the beginning of each run; None where none is strong enough.
 
     hz         range of its mean frequency
-    wanders    its frequency may vary by a sinusoid
+    wanders    its frequency may vary by a sinusoid, of which a record shows half a period or more
     """
     signals = white_residuals(context)
     rate = context.runs[0].rate_hz
+    if wanders and max(map(len, signals)) < _PERIODS_S[0] / 2 * rate:
+        return None
     began_s = context.runs[0].first / rate
     begin = _steady_tone(signals, rate, hz) if not wanders else _strongest_ridge(signals, rate, began_s, hz)
     at = np.array([begin.frequency_hz, begin.frequency_hz * begin.wander_cos_s,

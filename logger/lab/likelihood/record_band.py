@@ -126,14 +126,16 @@ def with_pass_bands(runs: Sequence[Run], predictions: Sequence[Array], low_pass_
 def cut_to_pass_band(run: Run, prediction: Array, seen: LowPass | None, low_pass_hz: float | None = None) -> Run:
     """The run filtered to its pass band, given the low-pass that it went through, and a model's prediction (n,). What a
     rig does may all be slow, without any filter: a band that is asked for is taken there, however narrow, and what
-    seems to be a filter below is none.
+    seems to be a filter below is none. Nor is one seen in a record that would lose most of its samples with its end.
 
-    ValueError where nothing is left.
+    ValueError where nothing, or less than half of a rig's record, is left.
     """
     low_hz, high_hz = run.pass_band_hz
     if low_pass_hz is not None:
         high_hz = min(high_hz, low_pass_hz)
-    if run.timed and seen is not None and not is_wide_enough(run, seen):
+    end = reach(run.rate_hz)
+    is_long = not run.timed or run.count - run.first >= 2 * end
+    if run.timed and seen is not None and not (is_long and is_wide_enough(run, seen)):
         seen = None
     if seen is not None and is_steep(seen) and (ends_hz := pass_band_end_hz(seen, run.rate_hz)) < high_hz:
         high_hz, seen = ends_hz, replace(seen, ends_band=True)
@@ -141,6 +143,10 @@ def cut_to_pass_band(run: Run, prediction: Array, seen: LowPass | None, low_pass
         raise ValueError(f"{run.name}: expected a pass band of {LEAST_WIDTH_HZ:g} Hz or wider, found {low_hz:.3g} "
                          f"to {high_hz:.3g} Hz")
     cut = (low_hz, high_hz) if low_hz > 0 or high_hz < run.rate_hz / 2 else None
+    if cut is not None and not is_long:
+        raise ValueError(f"{run.name}: expected a record of {(2 * end + run.first) / run.rate_hz:.2g} s or longer "
+                         f"where its band is cut, as the last {end / run.rate_hz:.2g} s are lost, found "
+                         f"{run.count / run.rate_hz:.2g} s")
     there = replace(run, low_pass=seen, facts=replace(run.facts, pass_band_hz=cut),
                     usable=run.usable if cut is None else _without_its_end(run))
     residual = run.residual(prediction)

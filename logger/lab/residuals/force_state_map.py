@@ -28,7 +28,7 @@ Shape = Callable[[Array, Array], Array]
 
 _KNOTS = np.array([-2.8, -1.8, -1.1, -0.6, -0.25, 0.0, 0.25, 0.6, 1.1, 1.8, 2.8])
 """Knots of a curve, in units of the r.m.s. of its coordinate: closer together where more samples are, the outermost
-ones where half a per cent of a normal distribution is beyond (its quantile there is 2.81)."""
+ones where half a per cent of a normal distribution is beyond (its quantile there is 2.81), or where the largest is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +156,7 @@ def _fit(target: Sequence[Array], others: Sequence[Array], columns: Sequence[Arr
 def _curve(regression: _Regression, residuals: ModelResiduals, of_rate: bool) -> Curve:
     """The curve of the missing force by rate or by travel."""
     driven = np.concatenate([(one.rate_mps if of_rate else one.travel_m).ravel() for one in residuals.responses])
-    knots = _KNOTS * (float(np.sqrt(np.mean(driven**2))) or 1.0)
+    knots = _KNOTS * (min(float(np.sqrt(np.mean(driven**2))), float(np.abs(driven).max()) / _KNOTS[-1]) or 1.0)
     used = np.flatnonzero(_KNOTS)
     coefficients, covariance, p_value, share = regression.fit(
         _responses_at_sensor(residuals, [_hat(knots, int(index), of_rate) for index in used]))
