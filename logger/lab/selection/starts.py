@@ -32,7 +32,7 @@ from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly
 from logger.lab.selection.evidence import IMITATION, INDISTINGUISHABLE
 from logger.lab.selection.holdout import most_of
 from logger.lab.selection.screening import Baseline, Screened, Trial, effects_without
-from logger.lab.selection.stepwise import MeasuredRoad, Progress, is_outside_data
+from logger.lab.selection.stepwise import MeasuredRoad, Progress, SearchEffort, is_outside_data
 from logger.simulation.virtual_drive import SEARCH_HZ, SimulatedRuns
 from logger.vehicle.effect import Chosen, Effect, Misalignment, Sought, chosen
 from logger.vehicle.models import structure_of
@@ -52,11 +52,13 @@ class Started(Screened):
     others           the best of these of each kind that are not improved yet, with their deviances
     ends             the first of each kind, improved; of kinds with refinements, if its plain form is the best so far
     gain_by_squares  of the best of them over the model, in minus twice the log of the likelihood under white noise
+    known            deviance of the model with the effect in whose place it is tried
     """
 
     others: Sequence[_Drawn]
     ends: Sequence[_Drawn]
     gain_by_squares: float
+    known: float = np.inf
 
     @property
     def gain(self) -> float:
@@ -149,8 +151,8 @@ class UnknownNumbers(MeasuredRoad):
                 continue
             # What leaves far more than the effect in whose place it is tried is fitted from its trial alone.
             worth = ends and _explaining_most(by_squares, ends[0][0]) < known
-            found.append(Started(one.effect, one.trials, [*refined, *others], ends, without - ends[0][0])
-                         if worth else one)
+            found.append(Started(one.effect, one.trials, [*refined, *others] if self._done() < enough else [], ends,
+                                 without - ends[0][0], known) if worth else one)
             if ends and ends[0][0] < least and not is_outside_data(base.posterior, ends[0][1].effects[-1]):
                 least, best = ends[0]
                 numbers = best.logs if self._shows_the_car(by_squares, anchor, best) else None
@@ -186,14 +188,15 @@ class UnknownNumbers(MeasuredRoad):
             alike = [deviance for deviance, end in ends if end.effects[-1].is_plain is _is_plain(other)]
             needed = np.inf if _is_plain(other) else _explaining_most(by_squares, _plain(ends))
             if len(alike) < 2 or (alike[1] > alike[0] + INDISTINGUISHABLE and alike[0] < needed):
-                ends.append(by_squares.improved(other[1], to_reach=min([needed, *alike])))
+                ends.append(by_squares.improved(other[1], to_reach=min([needed, one.known, *alike])))
                 ends.sort(key=_by_deviance)
         self._keep(ends)
         trials = {trial.one.is_plain: trial for trial in reversed(one.trials)}
         needed = _explaining_most(by_squares, _plain(ends))
         best = {_is_plain(end): end[1] for end in reversed(ends) if _is_plain(end) or end[0] < needed}
         found = fit_roughly(score, base, replace(one, trials=tuple(trials.values())))
-        found += [CandidateFit.of(score, self._likeliest(by_squares.of_all(state, base.state), base.posterior))
+        enough = SearchEffort.round_share * base.explanation
+        found += [CandidateFit.of(score, self._likeliest(by_squares.of_all(state, base.state), base.posterior, enough))
                   for state in best.values()]
         found.sort(key=lambda one: -one.gain)
         alike = [deviance for deviance, state in ends if state.effects[-1].is_plain == found[0].chosen.is_plain]
@@ -209,13 +212,14 @@ class UnknownNumbers(MeasuredRoad):
         return found
 
     @staticmethod
-    def _likeliest(start: State, posterior: Posterior) -> LinearModel:
-        """The model fitted by the likelihood from a state; there, where that leads away: the likelihood of a model that
-        lacks something may have its maximum at a car that moves quite differently."""
+    def _likeliest(start: State, posterior: Posterior, enough: float = 0.0) -> LinearModel:
+        """The model fitted by the likelihood from a state until a round gains less than enough; there, where that leads
+        away: the likelihood of a model that lacks something may have its maximum at a car that moves quite
+        differently."""
         begun = LinearModel(posterior, start, posterior.number_slopes(start, posterior.prior.steps))
         try:
             with np.errstate(all="ignore"):
-                found = fit(begun, begun.numbers, at_most=12)
+                found = fit(begun, begun.numbers, min_gain=enough, at_most=12)
         except NotSimulated:
             return begun
         leads_away = posterior.error(found.state) > (1 + UNEXPLAINED) * posterior.error(start)

@@ -140,7 +140,7 @@ def test_refinements_are_followed_where_they_may_explain_most_of_what_the_plain_
             one, = search.screened(base, effects, still, None, pool, lambda words: None)
         screened = {is_plain for is_plain, _ in calls[1:]}
         fitted = list[bool]()
-        monkeypatch.setattr(search, "_likeliest", lambda start, _: fitted.append(start.effects[-1].is_plain))
+        monkeypatch.setattr(search, "_likeliest", lambda start, *_: fitted.append(start.effects[-1].is_plain))
         fit = SimpleNamespace(gain=0.0, chosen=one.trials[0].one)
         monkeypatch.setattr(starts.CandidateFit, "of", lambda *given: fit)
         monkeypatch.setattr(starts, "fit_roughly", lambda *given: [])
