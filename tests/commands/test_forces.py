@@ -20,8 +20,11 @@ from logger.api.lab.bench import bench_with
 from logger.api.lab.question import CompareQuestion
 from logger.commands.main import main
 from logger.errors import BadInput
+from logger.lab.laws.draft import LawContext
+from logger.lab.laws.families.hum import FAMILY as HUM
 from logger.lab.likelihood.map_fit import align, fit_to_the_end
 from logger.lab.likelihood.standard_errors import standard_errors
+from logger.vehicle.effect import chosen
 from logger.vehicle.named_parameters import read
 
 from ..support.drives.course import Course, integrated
@@ -1212,3 +1215,15 @@ def test_a_second_of_a_part_is_not_cut_to_a_band_as_most_of_it_would_be_lost(tmp
                                         "damping_n_s_per_m: 80\n")
     with pytest.raises(BadInput, match=r"a record of 1\.9 s or longer where its band is cut.*found 1\.3 s"):
         main(["compare", "--vehicle", str(tmp_path / "part.yaml"), "--low-pass", "20", str(run)])
+
+
+def test_a_force_may_hum_by_kilonewtons(tmp_path: Path) -> None:
+    """It was m/s2, 100 at most, which ended the command."""
+    run = second_of_a_part(tmp_path / "short", lambda travel_m, rate_mps: 9e4 * rate_mps + 4e3 * np.sin(
+        2 * np.pi * 31 / 120 * np.arange(len(travel_m))))
+    (tmp_path / "part.yaml").write_text("name: part\nmodel: component\nstiffness_n_per_m: 0\ndamping_n_s_per_m: 9e+4\n")
+    posterior = bench_with(CompareQuestion(tmp_path / "part.yaml", [run])).posterior()
+    steady, *_ = HUM.drafts(LawContext(posterior, posterior.start()))
+    assert {one.name for one in steady.effect.parameters} == {"cos_n", "sin_n", "frequency_hz"}
+    found = HUM.words(steady, chosen(steady.effect, {"cos_n": 4e3, "sin_n": 0.0, "frequency_hz": 31.0}), str)
+    assert "a hum of 2.8e+03 N r.m.s." in found

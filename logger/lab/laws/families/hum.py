@@ -65,12 +65,13 @@ class Hum(Family):
                 **more: Any) -> list[Draft]:
         """A tone of one phase at the beginning of all runs, and one of another phase in each."""
         size = rounded(float(np.std(np.concatenate(context.residuals))))
+        most, unit = max(100.0, 10 * size), context.runs[0].facts.main.name.rsplit("_", 1)[-1]
 
         def draft(runs: Sequence[str], variant: str) -> Draft:
-            strengths = [Parameter(in_run(part, run, "mps2"), 0.1 * size, -100.0, 100.0, 0.0, Scale.LINEAR,
+            strengths = [Parameter(in_run(part, run, unit), 0.1 * size, -most, most, 0.0, Scale.LINEAR,
                                    (0.1 * size,), f"{words} of the hum{of_run(run)}", step=0.02 * size)
                          for run in runs for part, words in (("cos", "cosine part"), ("sin", "sine part"))]
-            pairs = ", ".join(f"(p.{in_run('cos', run, 'mps2')}, p.{in_run('sin', run, 'mps2')})" for run in runs)
+            pairs = ", ".join(f"(p.{in_run('cos', run, unit)}, p.{in_run('sin', run, unit)})" for run in runs)
             pick = pairs if len(runs) == 1 else f"(\n        {pairs},\n    )[min(recording.run, {len(runs) - 1})]"
             return self.draft((*strengths, *numbers), _METHOD.format(cycles=cycles, pick=pick), signature=signature,
                               variant=variant, **more)
@@ -79,22 +80,25 @@ class Hum(Family):
         return [draft(runs, name) for runs, name in ways if runs]
 
     def words(self, draft: Draft, found: Chosen, say: FormatNumber) -> str:
-        size, begins = _strength(found.values), BEGINS * draft.variant.endswith(EACH)
+        (size, unit), begins = _strength(found.values), BEGINS * draft.variant.endswith(EACH)
         if draft.variant.startswith("by_way"):
-            return (f"a hum of {size:.2g} m/s2 r.m.s. with {say('cycles_per_m')} cycles{begins}, that the road does "
+            return (f"a hum of {size:.2g} {unit} r.m.s. with {say('cycles_per_m')} cycles{begins}, that the road does "
                     "not cause")
         wanders = ""
         if draft.variant.startswith("wanders"):
             late_s = float(np.hypot(found.values["early_cos_s"], found.values["early_sin_s"]))
             share = 2 * np.pi * late_s / found.values["period_s"]
             wanders = f", rising and falling by {share:.0%} in {say('period_s')}"
-        return (f"a hum of {size:.2g} m/s2 r.m.s. at {say('frequency_hz')}{wanders}{begins}, that the road does not "
+        return (f"a hum of {size:.2g} {unit} r.m.s. at {say('frequency_hz')}{wanders}{begins}, that the road does not "
                 "cause: an engine or a fan")
 
 
-def _strength(values: Mapping[str, float]) -> float:
-    parts = [value for name, value in values.items() if name.endswith("_mps2")]
-    return float(np.linalg.norm(parts) / np.sqrt(len(parts)))
+def _strength(values: Mapping[str, float]) -> tuple[float, str]:
+    """How loud it is, and its unit."""
+    parts = {name: value for name, value in values.items() if name.startswith(("cos_", "sin_"))}
+    unit = next(iter(parts)).rsplit("_", 1)[-1]
+    return (float(np.linalg.norm(list(parts.values())) / np.sqrt(len(parts))),
+            {"mps2": "m/s2", "mps": "m/s", "n": "N"}.get(unit, unit))
 
 
 def _shape(name: str, value: float, meaning: str, step: float) -> Parameter:
