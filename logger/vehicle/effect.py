@@ -210,6 +210,7 @@ class Effect(ABC):
                  their lows
     refinements  those of its parameters that say more of it than its plain form does, which it has while all of them
                  are at their defaults: no fit moves them then, and a search tries both
+    terms        those refinements that add a term of their own, of which nothing is left at 0
     variants     by the vehicle's model: the effect that stands in its place, where that has fewer parts than the
                  parameters speak of
     """
@@ -236,6 +237,7 @@ class Effect(ABC):
     also_by: tuple[str, ...] = ()
     stage: int = 0
     refinements: tuple[str, ...] = ()
+    terms: tuple[str, ...] = ()
     variants: "Mapping[str, Effect]" = MappingProxyType({})
 
     def __init_subclass__(cls) -> None:

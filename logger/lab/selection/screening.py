@@ -23,7 +23,7 @@ from logger.lab.likelihood.map_fit import align, effect_slopes, own_slopes
 from logger.lab.likelihood.noise_floor import excess_over_noise, gain_of_full_explanation
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.whittle import UNEXPLAINED
-from logger.lab.selection.evidence import FALSE_ALARM, min_gain
+from logger.lab.selection.evidence import FALSE_ALARM, INDISTINGUISHABLE, min_gain
 from logger.lab.selection.holdout import HoldOut, cross_validate
 from logger.runs import Run, are_on_rig
 from logger.vehicle.effect import AXLE, Chosen, Effect, Misalignment, Scale, SensorEffect, chosen
@@ -224,14 +224,13 @@ def screen(base: Baseline, effect: Effect, misaligned: Sequence[Misalignment],
         car = prior.vehicle(base.posterior.vehicle, base.state.logs)
         trials.append(trials[0] | {one.name: min(max(read(car, one.name), one.low), one.high) for one in known})
     found: dict[tuple[float, ...], dict[float, Trial]] = {}
-    strengths = [place for place, one in enumerate(effect.parameters) if one.is_free and one.null is not None]
     shape = next((one.name for one in effect.parameters if one.is_free and one.null is None), "")
 
     def try_out(values: dict[str, float]) -> None:
         one = chosen(effect, values)
         choice = (*(values[parameter.name] for parameter in effect.parameters if not parameter.is_free), one.is_plain)
         ways = [_trial_at_values(base, one) if effect.replaces else
-                _trial_at_best_strengths(base, one, strengths) if len(strengths) > 1 else
+                _trial_at_best_strengths(base, one, strengths) if len(strengths := _strengths_of(one)) > 1 else
                 _trial_at_best_strength(base, one)]
         if realigns and values is not trials[0]:
             ways.append(_realigned_trial(base, one, ways[0]))
@@ -240,14 +239,11 @@ def screen(base: Baseline, effect: Effect, misaligned: Sequence[Misalignment],
         if (there := values.get(shape, 0.0)) not in by_shape or trial.gain > by_shape[there].gain:
             by_shape[there] = trial
 
-    if len(strengths) > 1:  # at their nulls they have one derivative each, whatever a search begins at
-        free = {effect.parameters[place].name for place in strengths}
-        trials = [*{tuple(value for name, value in one.items() if name not in free): one for one in reversed(trials)
-                    }.values()][::-1]
-    for values in trials:
+    for values in _of_own_strengths(effect, trials):
         try_out(values)
     if AXLE in effect.parameters and base.posterior.vehicle.rear is not None:
-        both = max((trial for by_shape in found.values() for trial in by_shape.values()), key=lambda one: one.gain)
+        both = max((trial for by_shape in found.values() for trial in by_shape.values()),
+                   key=lambda one: one.gain - INDISTINGUISHABLE * (not one.one.is_plain))
         if both.gain > min_gain(1):
             for axle in AXLE.choices[1:]:
                 try_out({**both.one.values, AXLE.name: axle})
@@ -256,6 +252,23 @@ def screen(base: Baseline, effect: Effect, misaligned: Sequence[Misalignment],
     best += _delayed_trials(base, effect, misaligned[0])
     best = [trial for trial in best if near is None or not trial.one.is_shaped_as(near)]
     return Screened(effect, tuple(sorted(best, key=lambda trial: -trial.gain)))
+
+
+def _strengths_of(one: Chosen) -> list[int]:
+    """Places of an effect's parameters, in its form, at whose nulls nothing is left of it or of one of its terms."""
+    return [place for place, each in enumerate(one.effect.parameters)
+            if each in one.freed and (each.null is not None or each.name in one.effect.terms)]
+
+
+def _of_own_strengths(effect: Effect, trials: Sequence[dict[str, float]]) -> list[dict[str, float]]:
+    """The trials, of those that differ in several strengths alone the first: at their nulls they have one derivative
+    each, whatever a search begins at."""
+    found: dict[tuple[object, ...], dict[str, float]] = {}
+    for values in trials:
+        places = _strengths_of(chosen(effect, values))
+        free = [effect.parameters[place].name for place in places if len(places) > 1]
+        found.setdefault((*free, *(value for name, value in values.items() if name not in free)), values)
+    return [*found.values()]
 
 
 def _delayed_trials(base: Baseline, effect: Effect, seen: Misalignment) -> list[Trial]:
@@ -349,7 +362,7 @@ def _trial_at_best_strengths(base: Baseline, one: Chosen, strengths: Sequence[in
     """The trial of an effect with several strengths, its parameters at these places, after one Gauss-Newton step of
     these, from their nulls, and of all other numbers."""
     linear, state = base.linear, base.state
-    nulls = {each.name: each.null for each in one.effect.parameters if each.is_free and each.null is not None}
+    nulls = {each.name: each.null or 0.0 for each in map(one.effect.parameters.__getitem__, strengths)}
     effects = (*state.effects, replace(one, values={**one.values, **nulls}))
     free = [FreeParameter(len(state.effects), place) for place in strengths]
     slopes = effect_slopes(base.posterior, effects, state.logs, free, state.record, None)

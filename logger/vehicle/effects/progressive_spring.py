@@ -26,6 +26,7 @@ class ProgressiveSpring(ForceEffect):
         AXLE,
     )
     refinements = ("quadratic_stiffness_n_per_m2", "levelling_per_m2")
+    terms = ("quadratic_stiffness_n_per_m2",)
     source = "A. H. Nayfeh, D. T. Mook, Nonlinear Oscillations (1979), 2.3 (the equation of Duffing)"
     signature = "the spring is stiffer at large travel: the body bounces faster on bumps than on a smooth road"
     shown_by = "drive slowly over large bumps or dips, so that the suspension travels several centimetres"

@@ -240,3 +240,13 @@ def test_a_delay_that_the_distances_absorbed_does_not_hide_the_order_of_a_filter
     assert best.chosen.values["cutoff_hz"] == pytest.approx(cutoff_hz, rel=0.15)
     others = [one for one in found.trials if abs(one.one.values["order"] - order) > 2]
     assert best.gain > 1.1 * max((one.gain for one in others), default=0.0)
+
+
+def test_a_term_that_the_plain_form_has_not_promises_what_it_is_worth_and_its_size() -> None:
+    """A cushion: the harder, the farther it is pressed, which a cubic term alone cannot be."""
+    cushion = hidden("progressive_spring", cubic_stiffness_n_per_m3=1e4, quadratic_stiffness_n_per_m2=-3e5)
+    base = fitted(posterior_of(secret_runs([cushion], rougher=2.0)))
+    trials = screen(base, EFFECTS["progressive_spring"], [STILL]).trials
+    plain, refined = (max(one.gain for one in trials if one.one.is_plain is form) for form in (True, False))
+    assert not trials[0].one.is_plain and refined > 5 * plain
+    assert trials[0].one.values["quadratic_stiffness_n_per_m2"] == pytest.approx(-3e5, rel=0.2)
