@@ -397,7 +397,7 @@ def decibels(residuals: ModelResiduals, signals: Sequence[Array]) -> Array:
 
 
 def spectra(residuals: ModelResiduals) -> tuple[Curves, Curves]:
-    """The charts of it: of the body, and of the wheels and above."""
+    """The charts of it: where a car's body moves, and where its wheels do and above."""
     f_hz, unit = frequencies(residuals), residuals.unit
     levels_db = [decibels(residuals, one) for one in (residuals.measured, residuals.residual, residuals.model)]
 
@@ -407,7 +407,7 @@ def spectra(residuals: ModelResiduals) -> tuple[Curves, Curves]:
             Line(name, f_hz[inside], one[inside])
             for name, one in zip(("measured", "residual", "model"), levels_db, strict=True)))
 
-    return drawn("Body", 0.0, _BODY_HZ), drawn("Wheels and above", _BODY_HZ, f_hz[-1])
+    return drawn(f"Up to {_BODY_HZ:g} Hz", 0.0, _BODY_HZ), drawn(f"Above {_BODY_HZ:g} Hz", _BODY_HZ, f_hz[-1])
 
 
 def _places(standing: Standing) -> Section:
