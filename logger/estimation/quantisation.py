@@ -13,13 +13,14 @@ on one side only.
 """
 
 from dataclasses import dataclass
-from math import log
+from functools import lru_cache
+from math import log, sqrt
 
 import numpy as np
 
-from logger.arrays import Array
+from logger.arrays import Array, Bools
 from logger.estimation.car_response import SteadyMotion
-from logger.estimation.normal_distribution import within
+from logger.estimation.normal_distribution import density, distribution, within
 from logger.estimation.sensor_noise import Sensor
 from logger.estimation.time_grid import neighbours
 
@@ -31,6 +32,7 @@ _LEAST_SLOPE = 1e-6  # of others with even readings, where no reading says anyth
 # In readings that say the same: wide enough to be a mean, and short beside the ringing of a lone bump. By dense algebra
 # 3 to 16 are as good, but a bump of 5 cm on a flat road reads 9 % too rough with 4, and 18 % and more with 6 to 8.
 _MEDIUM_REACH = 4.0
+_EDGES_APART = 0.25  # of a step: by integration, 1 to 8 reads on one step are right within 6 % of a deviation then
 _MOST_OWN = 0.9  # of what a solution knows of an acceleration, from its own reading
 
 
@@ -112,27 +114,55 @@ def cavity_of_reads(motion: SteadyMotion, variance: Array, relative: Array) -> t
     return 1 / (np.repeat(1 / others, reads) + (np.repeat(of_sample, reads) - own)), np.repeat(even * reads, reads)
 
 
-def without_own(readings: GaussianReadings, fitted_mps2: Array, fitted_variance: Array | float) -> tuple[Array, Array]:
+def without_own(readings: GaussianReadings, fitted_mps2: Array, fitted_variance: Array | float,
+                same: Array | int = 1) -> tuple[Array, Array]:
     """What all other readings say of each acceleration: mean [m/s2] and variance [(m/s2)2], (t,); as ``improved``."""
-    taken_out = np.minimum(1 / readings.variance, _MOST_OWN / fitted_variance)
+    taken_out = np.minimum(same / readings.variance, _MOST_OWN / fitted_variance)
     others = 1 / fitted_variance - taken_out
     return (fitted_mps2 / fitted_variance - readings.value_mps2 * taken_out) / others, 1 / others
 
 
+def standing_for(reading_mps2: Array, usable: Bools, sensor: Sensor) -> Array:
+    """For how many reads of its sample, each (t, k), each (t k,) stands in ``improved``: for all where they are on one
+    step, and the noise leaves its edges apart; each by itself is right where they toggle, or more noise does that."""
+    reads = reading_mps2.shape[1]
+    alike = usable.all(axis=1) & (np.ptp(reading_mps2, axis=1) < 0.5 * sensor.step_mps2)
+    alike &= sensor.noise_rms_mps2 < _EDGES_APART * sensor.step_mps2
+    return np.repeat(np.where(alike, reads, 1), reads)
+
+
+@lru_cache(maxsize=8)
+def _largest_of(count: int) -> tuple[float, float]:
+    """Mean and standard deviation of the largest of so many standard normal numbers."""
+    u = np.linspace(-9.0, 9.0, 1801)
+    weight = count * density(u) * distribution(u) ** (count - 1)
+    weight /= weight.sum()
+    mean = float(weight @ u)
+    return mean, sqrt(float(weight @ (u - mean) ** 2))
+
+
 def improved(readings: GaussianReadings, low: Array, high: Array, expected: Array, others: Array,
-             noise_variance: float, alike: float = 0.0) -> GaussianReadings:
+             noise_variance: float, beside: float = 0.0, same: Array | None = None, reads: int = 1
+             ) -> GaussianReadings:
     """One round.
 
     low, high           (t,) bounds of each reading [m/s2]
-    expected, others    (t,) of each acceleration by all other readings, as ``without_own``
+    expected, others    (t,) of each acceleration by all readings but those that it stands for, as ``without_own``
     noise_variance      of a reading before it is rounded [(m/s2)2]
-    alike               by which it counts less, because others have the same error; that blurs no step
+    beside              of what moves all ``reads`` of a sample alike: they tell no more of the road than one
+    same                (t,) 1, or ``reads`` where it stands for all of its sample. They are one bound, not so many: the
+                        largest of their noises keeps below the upper one, the smallest above the lower one. Each by
+                        itself, its others would have the bound already, and what toggles little would be known the
+                        better, the more often it is read (Minka, Power EP, Microsoft Research 2004)
     """
-    own = 1 / readings.variance
-    spread = others + noise_variance
-    mean, variance = within(expected, spread, low, high)
+    own, deviation, count = 1 / readings.variance, sqrt(noise_variance), np.ones(len(low)) if same is None else same
+    mean_largest, scatter = _largest_of(reads)
+    inward = np.where(count > 1, mean_largest * deviation, 0.0)
+    noise = np.where(count > 1, scatter**2, 1.0) * noise_variance
+    spread = others + noise + beside
+    mean, variance = within(expected, spread, low + inward, high - inward)
     precision = np.maximum(1 / variance - 1 / spread, 1e-9 / spread)
     value = (mean / variance - expected / spread) / precision
-    new = 1 / (1 / precision + noise_variance + alike)
+    new = 1 / (count * (1 / precision + noise) + reads * beside)
     total = (1 - _KEPT) * new + _KEPT * own
     return GaussianReadings(((1 - _KEPT) * value * new + _KEPT * readings.value_mps2 * own) / total, 1 / total)

@@ -25,6 +25,7 @@ from logger.estimation.quantisation import (
     cavity_of_reads,
     first_guess,
     improved,
+    standing_for,
     unexplained,
     without_own,
 )
@@ -186,12 +187,10 @@ class FollowedRoad:
         if self._gaussian is None:
             return
         # What readings say of accelerations of which no other tells yet: they go on as they were.
-        low, high = self._bounds(fresh)
-        count = len(low)
+        count = fresh.reading_mps2.size
         centre = np.full(count, self._centre_mps2)
         nothing = GaussianReadings(centre, np.full(count, np.inf))
-        guess = improved(nothing, low, high, centre, np.full(count, self._accel_variance), self._noise_variance,
-                         self._alike(fresh))
+        guess = self._bounded(nothing, fresh, centre, np.full(count, self._accel_variance), self._same(fresh))
         self._response.move_on(count)
         self._gaussian = GaussianReadings(np.concatenate([self._gaussian.value_mps2[count:], guess.value_mps2]),
                                           np.concatenate([self._gaussian.variance[count:], guess.variance]))
@@ -369,24 +368,24 @@ class FollowedRoad:
         """Another round for the bounds, with the variance (y,) that all other readings leave of each acceleration, and
         what they say of it, as ``without_own``; the readings that are ``read`` (y,) count."""
         low, high = self._bounds(samples)
-        others = others + unexplained(solution.fitted_mps2[read], low[read], high[read], self._noise_variance)
+        blurred = self.sensor.noise_rms_mps2**2 + self._beside_road
+        others = others + unexplained(solution.fitted_mps2[read], low[read], high[read], blurred)
         fitted_variance = 1 / (1 / others + 1 / readings.variance)
-        expected, about = without_own(readings, solution.fitted_mps2, fitted_variance)
-        found = improved(readings, low, high, expected, about, self._noise_variance, self._alike(samples))
-        return found, expected, about
+        same = self._same(samples)
+        apart = without_own(readings, solution.fitted_mps2, fitted_variance, same)
+        return (self._bounded(readings, samples, *apart, same),
+                *without_own(readings, solution.fitted_mps2, fitted_variance))
+
+    def _bounded(self, readings: GaussianReadings, samples: RoadSamples, expected: Array, others: Array, same: Array
+                 ) -> GaussianReadings:
+        return improved(readings, *self._bounds(samples), expected, others, self.sensor.noise_rms_mps2**2,
+                        self._beside_road, same, samples.reading_mps2.shape[1])
+
+    def _same(self, samples: RoadSamples) -> Array:
+        return standing_for(samples.reading_mps2, samples.usable, self.sensor)
 
     def _bounds(self, samples: RoadSamples) -> tuple[Array, Array]:
         return bounds(samples.reading_mps2.ravel(), samples.at_end.ravel(), self._step_mps2)
-
-    @property
-    def _noise_variance(self) -> float:
-        """Of a reading about the road's part of it, before it is rounded [(m/s2)2]."""
-        return self.sensor.noise_rms_mps2**2 + self._beside_road
-
-    def _alike(self, samples: RoadSamples) -> float:
-        """What is beside the road moves all reads of a sample alike, and they tell no more of the road than one: the
-        variance by which each counts less for that [(m/s2)2]."""
-        return (samples.reading_mps2.shape[1] - 1) * self._beside_road
 
     def _noise_evidence(self, expected: Array, others: Array, samples: RoadSamples, usable: Bools, newest: int
                         ) -> tuple[Array, int]:

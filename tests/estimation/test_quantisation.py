@@ -4,7 +4,15 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from logger.estimation.quantisation import GaussianReadings, bounds, first_guess, improved, unexplained, without_own
+from logger.estimation.quantisation import (
+    GaussianReadings,
+    bounds,
+    first_guess,
+    improved,
+    standing_for,
+    unexplained,
+    without_own,
+)
 from logger.estimation.sensor_noise import Sensor
 
 COARSE = Sensor(noise_rms_mps2=0.1, step_mps2=0.6)
@@ -66,17 +74,37 @@ def test_an_error_that_all_reads_share_blurs_their_steps_no_more_than_those_of_o
     share = deviation**2 / (deviation**2 + error_variance)
     exactly = share * both_mean, np.sqrt((share * both_spread) ** 2 + (1 - share) * deviation**2)
 
-    def off(blurs: float, alike: float) -> float:
+    def off(blurs: float, beside: float) -> float:
         """Errors of mean, in standard deviations, and of the logarithm of that."""
         readings = GaussianReadings((low + high) / 2, np.full(4, 0.1))
         for _ in range(300):
             variance = 1 / (deviation**-2 + (1 / readings.variance).sum())
             mean = variance * (readings.value_mps2 / readings.variance).sum()
             readings = improved(readings, low, high, *without_own(readings, np.full(4, mean), variance),
-                                noise**2 + blurs, alike)
+                                noise**2 + blurs, beside, reads=4)
         return float(abs(mean - exactly[0]) / exactly[1] + abs(np.log(np.sqrt(variance) / exactly[1])))
 
-    assert off(error_variance, 3 * error_variance) < 0.9 * off(4 * error_variance, 0.0)
+    assert off(0.0, error_variance) < 0.9 * off(4 * error_variance, 0.0)
+
+
+@pytest.mark.parametrize("deviation", [0.3, 1.0])
+@pytest.mark.parametrize("noise", [0.02, 0.06, 0.14, 0.3])
+@pytest.mark.parametrize("reads", [2, 4, 8])
+def test_reads_of_one_acceleration_on_one_step_are_one_bound(deviation: float, noise: float, reads: int) -> None:
+    """By integration; each for itself, eight reads with little noise would know it a quarter better than they can."""
+    sensor = Sensor(noise, COARSE.step_mps2)
+    reading = np.full((1, reads), -0.1)
+    low, high = bounds(reading[0], np.zeros(reads), sensor.step_mps2)
+    same = standing_for(reading, np.ones((1, reads), dtype=bool), sensor)
+    readings = GaussianReadings(reading[0], np.full(reads, 0.1))
+    for _ in range(300):
+        variance = 1 / (deviation**-2 + (1 / readings.variance).sum())
+        mean = variance * (readings.value_mps2 / readings.variance).sum()
+        apart = without_own(readings, np.full(reads, mean), variance, same)
+        readings = improved(readings, low, high, *apart, noise**2, same=same, reads=reads)
+    exact_mean, spread = exact(deviation, low, high, sensor)
+    assert mean == pytest.approx(exact_mean, abs=0.03 * spread)
+    assert np.sqrt(variance) == pytest.approx(spread, rel=0.06)
 
 
 @pytest.mark.parametrize("at_end", [-1.0, 1.0])
