@@ -24,7 +24,7 @@ _PLACE = {"half_car": ("ahead_m",), "full_car": ("ahead_m", "left_m")}
 WEAKEST = 0.5
 """A number whose standard error is larger than this share of it has not been measured."""
 # How far from its start a number may go when nothing else is said: a factor, and limits for places on the car [m].
-_FACTOR = 20.0
+FACTOR = 20.0
 _LENGTHS, _LENGTH_FACTOR = ("cg_distance_m", "track_width_m", "contact_patch_m"), 3.0
 _FARTHEST_M = 3.0
 _PRELOAD_N = 50.0  # where a search for one begins that is not known
@@ -196,8 +196,8 @@ def bounds_of(name: str, value: float) -> tuple[float, float]:
     if name.startswith(f"{SENSOR}."):
         return -_FARTHEST_M, _FARTHEST_M
     if name == PRELOAD:
-        return -_FACTOR * max(abs(value), _PRELOAD_N), _FACTOR * max(abs(value), _PRELOAD_N)
-    factor = _LENGTH_FACTOR if name.rpartition(".")[2] in _LENGTHS else _FACTOR
+        return -FACTOR * max(abs(value), _PRELOAD_N), FACTOR * max(abs(value), _PRELOAD_N)
+    factor = _LENGTH_FACTOR if name.rpartition(".")[2] in _LENGTHS else FACTOR
     high = value * factor
     return value / factor, min(high, _LONGEST_PATCH_M) if name == "contact_patch_m" else high
 

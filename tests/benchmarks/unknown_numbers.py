@@ -1,9 +1,9 @@
 """A bench quarter car whose numbers nobody knows: is the effect that its file lacks named, and are its numbers right?
 
 Rigs of 2.5 kg are drawn, with friction of the wheel's guide, of the body's guide or of the suspension, with a spring
-that hardens, and with none of these; the masses and springs of their file are off by up to a factor of two, one alone,
-the sprung mass, was weighed. Each is shaken twice by one sweep of 30 s, by an integrator that shares nothing with
-ridelog. One draw takes minutes:
+that hardens or has play, and with none of these; the masses and springs of their file are off by up to a factor of
+two, one alone, the sprung mass, was weighed. Each is shaken twice by one sweep of 30 s, by an integrator that shares
+nothing with ridelog. One draw takes minutes:
 
     nice python -m tests.benchmarks.unknown_numbers RESULTS.csv [DRAWS]
 
@@ -31,6 +31,7 @@ HIDDEN = {
     "body guide": ("frame_friction", "body_friction_force_n", "body_guide_n", 1.5),
     "suspension": ("dry_friction", "friction_force_n", "friction_n", 1.0),
     "cubic spring": ("progressive_spring", "cubic_stiffness_n_per_m3", "cubic", 4e6),
+    "play": ("play", "half_gap_m", "gap_m", 5e-4),
     "nothing": ("", "", "", 0.0),
 }
 """Effect, its number, that of the rig, and its size."""

@@ -97,13 +97,13 @@ class BySquares:
         loudest = max(self.kept, key=lambda one: float(self.whole.runs.runs[one].kept_mps2.std()))
         return self if len(self.kept) == 1 else BySquares(self.whole, [loudest])
 
-    def improved(self, start: State, rounds: int = ROUNDS, to_reach: float = np.inf, min_share: float = 0.0
-                 ) -> tuple[float, State]:
-        """A state improved in so many rounds of steps, and its deviance; as long as those that are left may reach a
-        deviance at the pace of the last, and a round gains such a share of the whole gain."""
+    def improved(self, start: State, rounds: int = ROUNDS, to_reach: float = np.inf, min_share: float = 0.0,
+                 later: int = 0) -> tuple[float, State]:
+        """A state improved in so many rounds of steps, and its deviance; as long as those that are left, and so many
+        ``later``, may reach a deviance at the pace of the last, and a round gains such a share of the whole gain."""
         least = first = self.deviance(start)
         best = start
-        for left in reversed(range(rounds)):
+        for left in reversed(range(later, later + rounds)):
             try:
                 with np.errstate(all="ignore"):
                     linear = LinearModel(self.posterior, best, self.posterior.number_slopes(

@@ -250,8 +250,8 @@ def optimise_numbers(linear: LinearModel, state: State, free_parameters: Sequenc
     # it by next to nothing, and looks like the last.
     by_priors = linear.prior.is_vague or linear.posterior.shows_forces
     damping = Damping(first=Damping.least) if by_priors else Damping()
-    ends = np.array([(-np.inf, np.inf)] * p + [ends_of(state.effects[free.effect].effect.parameters[free.parameter])
-                                               for free in free_parameters]).reshape(-1, 2)
+    ends = np.array([*linear.posterior.ends.T[:p], *(ends_of(
+        state.effects[free.effect].effect.parameters[free.parameter]) for free in free_parameters)]).reshape(-1, 2)
     best = minimise(start, evaluate, normal_equations, small_gain=lambda _at: small_gain, most_rounds=_STEPS,
                     low=ends[:, 0], high=ends[:, 1], damping=damping).at
     return State(best.effects, best.logs, best.fit.record, linear.size, best.predictions)

@@ -87,6 +87,12 @@ class Posterior:
         """Whether a signal is a force."""
         return any(signal.measures == "force" for run in self.runs.runs for signal in (run.facts.main, *run.signals))
 
+    @property
+    def ends(self) -> Array:
+        """Lowest and highest logarithms of the car's numbers (2, p) that a fit goes to."""
+        starts = self.prior.logs(self.vehicle, self.start_vehicle)
+        return np.stack([np.minimum(starts, 0.0) - self.prior.reach, np.maximum(starts, 0.0) + self.prior.reach])
+
     def simulated(self, fine_hz: float) -> Posterior:
         """The posterior with runs simulated in so many steps a second."""
         found = copy(self)

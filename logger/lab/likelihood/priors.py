@@ -14,7 +14,7 @@ import numpy as np
 from logger.arrays import Array, Bools
 from logger.bounds import CONFLICT_SIGMA, UNUSUAL_SIGMA
 from logger.runs import ENCODER, SENSOR, Signal
-from logger.vehicle.named_parameters import PRELOAD, WEAKEST, changed, read, sized
+from logger.vehicle.named_parameters import FACTOR, PRELOAD, WEAKEST, changed, read, sized
 from logger.vehicle.uncertain import Known, grows_with_mass
 from logger.vehicle.vehicle import Vehicle
 
@@ -100,6 +100,14 @@ class VehiclePrior:
         """Standard deviation of a common scale of all masses and forces, as a share: of the best known of them."""
         return min((float(one) for name, one in zip(self.names, self.deviations, strict=True) if grows_with_mass(name)),
                    default=0.0)
+
+    @property
+    def reach(self) -> Array:
+        """How far a fit may take the logarithms (p,): of a number that nobody measured as far as is unusual, or by the
+        factor within which fits stay. On the way to a rigid tire or a wheel without mass its derivative vanishes: a
+        fit does not come back from there, be it where another car explains more. What was measured may contradict its
+        tolerance."""
+        return np.where(self._not_measured, np.maximum(UNUSUAL_SIGMA * self.deviations, np.log(FACTOR)), np.inf)
 
     @property
     def _not_measured(self) -> Bools:

@@ -21,7 +21,7 @@ import numpy as np
 
 from logger.arrays import Array
 from logger.identification.time_scale import ringing_hz
-from logger.lab.likelihood.by_squares import BySquares
+from logger.lab.likelihood.by_squares import ROUNDS, BySquares
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit, fit_model
 from logger.lab.likelihood.noise_floor import floor_error, sensor_noise_of
@@ -71,7 +71,9 @@ class UnknownNumbers(MeasuredRoad):
     """The likelihood of drives over a measured road, of a car whose numbers are not known.
 
     draws        cars that are drawn for each effect
-    starts       so many of each kind of them, the best, are improved to the end
+    tried        so many of those around the file's car, the best of each form, are improved a little, and one of those
+                 around the fitted one, which lie in its valley
+    starts       so many of those without an effect, or where others have shown the car, are improved to the end
     most         work of simulations (``SimulatedRuns.work``) after which a search takes no further step: about 80 s of
                  a processor. A round draws cars until three quarters of it are done or, where they are, a sixth more.
                  Judgements
@@ -80,6 +82,7 @@ class UnknownNumbers(MeasuredRoad):
     """
 
     draws: int = 120
+    tried: int = 3
     starts: int = 2
     most: float = 8e8
     ends: dict[str, tuple[int, int]] = field(default_factory=dict)
@@ -139,12 +142,13 @@ class UnknownNumbers(MeasuredRoad):
                 continue
             drafted = one.effect.sought is Sought.NEVER  # by the motions of the records, as it begins
             drawn = [] if drafted else self._cars(by_squares, one.effect, anchor, one.trials, numbers)
-            first, others = [some[0] for some in drawn], [each for some in drawn for each in some[1:]]
-            plain = [each for each in first if _is_plain(each)] or first
-            refined = [each for each in first if each not in plain]
-            ends = _improved(pool, by_squares, plain, least)
+            forms = [some for some in drawn if _is_plain(some[0])] or drawn
+            ends, others = _improved(pool, by_squares, [each for some in forms for each in some], least)
+            forms = [some for some in drawn if some not in forms]
+            refined = [some[0] for some in forms]
+            others += [each for some in forms for each in some[1 : self.starts]]
             if ends and ends[0][0] < least:
-                ends += _improved(pool, by_squares, refined, _explaining_most(by_squares, _plain(ends)))
+                ends += _improved(pool, by_squares, refined, _explaining_most(by_squares, _plain(ends)))[0]
                 ends.sort(key=_by_deviance)
                 refined = []
             if near is not None and one.effect is near.effect and ends and ends[0][0] > known - INDISTINGUISHABLE:
@@ -248,10 +252,12 @@ class UnknownNumbers(MeasuredRoad):
         """The best cars of each kind with the effects of a state and one more, the best first. Cars are drawn once for
         an effect, unless the car's numbers are ``known``; later rounds begin where these ended, and at its trials on
         the model."""
-        cars = self._known(effect, near, trials, known) or self._draw(effect, by_squares.posterior, near)
+        cars, counts = self._known(effect, near, trials, known), [self.starts]
+        if not cars:
+            cars, counts = self._draw(effect, by_squares.posterior, near), [self.tried, 1] if effect else counts
         ranked = [{by_squares.rank(effects, logs, near): (effects, logs) for effects, logs in some} for some in cars]
-        best = [[state for deviance in sorted(some)[: self.starts]
-                 if (state := by_squares.at(*some[deviance], near)) is not None] for some in ranked]
+        best = [[state for deviance in sorted(some)[: counts[place % len(counts)]]
+                 if (state := by_squares.at(*some[deviance], near)) is not None] for place, some in enumerate(ranked)]
         return [some for some in best if some]
 
     def _known(self, effect: Effect | None, near: State, trials: Sequence[Trial], known: Array | None
@@ -344,10 +350,22 @@ def _explaining_most(by_squares: BySquares, deviance: float) -> float:
 
 
 def _improved(pool: ThreadPoolExecutor, by_squares: BySquares, begun: Sequence[_Drawn], to_reach: float
-              ) -> list[_Drawn]:
-    """Cars improved as long as they may reach a deviance, the best first."""
-    return sorted(pool.map(partial(by_squares.improved, to_reach=to_reach), [state for _, state in begun]),
-                  key=_by_deviance)
+              ) -> tuple[list[_Drawn], list[_Drawn]]:
+    """Cars improved as long as they may reach a deviance, and the two best of those that were left behind; the best
+    first. Which of many lie in the valley shows after some rounds, not before (measured: of a rig whose body rubs on
+    its guide the car that led to it was the third, and then the first): all are improved a little, the better half as
+    much again, until two are left, which go to the end (successive halving: K. Jamieson and A. Talwalkar, AISTATS
+    2016)."""
+    def further(some: Sequence[_Drawn], rounds: int, later: int) -> list[_Drawn]:
+        improved = partial(by_squares.improved, rounds=rounds, later=later, to_reach=to_reach)
+        return sorted(pool.map(improved, [state for _, state in some]), key=_by_deviance)
+
+    now, behind = list(begun), list[_Drawn]()
+    while len(now) > 2:
+        now = further(now, ROUNDS // 4, ROUNDS)
+        half = max(2, len(now) // 2)
+        now, behind = now[:half], behind + now[half:]
+    return further(now, ROUNDS, 0), sorted(behind, key=_by_deviance)[:2]
 
 
 def _resized(one: Chosen, rng: np.random.Generator, spread: float) -> Chosen:

@@ -94,6 +94,15 @@ def test_where_numbers_are_not_known_the_prior_of_one_holds_the_scale_of_all() -
     assert dict(zip(posterior.prior.names, found.logs, strict=True))["sprung_mass_kg"] == pytest.approx(0, abs=0.003)
 
 
+def test_a_fit_takes_a_tire_that_nobody_measured_no_nearer_to_rigid_than_is_unusual() -> None:
+    """From there its derivative leads on and on (without that end, to 3,000 times the tire)."""
+    tire = "front.tire_stiffness_n_per_m"
+    posterior = Posterior(SimulatedRuns(noisy_runs(noise_mps2=0.002), FINE_HZ), CAR, Tolerance(by_name={tire: 1.0}))
+    off = np.array([name == tire for name in posterior.prior.names])
+    found = fit_to_the_end(LinearModel(posterior, posterior.state_at((), 6.0 * off))).state
+    assert np.log(2) < found.logs @ off <= 1.001 * posterior.prior.reach[off][0]
+
+
 def test_a_car_that_cannot_be_simulated_is_no_step(monkeypatch: pytest.MonkeyPatch) -> None:
     predict, tried = Posterior.predict, list[float]()
 

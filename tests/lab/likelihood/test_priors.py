@@ -118,6 +118,15 @@ def test_a_number_that_nobody_measured_contradicts_nothing() -> None:
     assert name not in unknown.beyond_tolerance(gone, well) and name in PRIOR.beyond_tolerance(gone, well)
 
 
+def test_a_fit_takes_a_number_that_nobody_measured_no_farther_than_is_unusual() -> None:
+    tire, mass = "front.tire_stiffness_n_per_m", "front.unsprung_mass_kg"
+    prior = VehiclePrior.of(CAR, Tolerance(by_name={tire: 1.0, mass: Known.unknown(mass, 40.0).deviation}))
+    reach = dict(zip(prior.names, prior.reach, strict=True))
+    assert reach[tire] == pytest.approx(3.0, abs=0.005)  # by a factor of 20
+    assert reach[mass] == pytest.approx(3 * np.log(20) / np.sqrt(3))
+    assert np.isinf([one for name, one in reach.items() if name not in (tire, mass)]).all()
+
+
 def test_a_number_known_to_a_fifth_that_comes_out_a_thousandth_of_the_file_is_beyond_its_tolerance() -> None:
     """Forces of a bench in kN."""
     name = "front.suspension_damping_n_s_per_m"

@@ -69,6 +69,7 @@ def test_a_start_ends_early_where_it_cannot_reach_another_at_its_pace() -> None:
     assert end < once < begun
     assert by_squares.improved(start, 12, end)[0] == end
     assert by_squares.improved(start, 12, once - 20 * (begun - once))[0] == once
+    assert by_squares.improved(start, 2, once - 20 * (begun - once), later=1000)[0] < once
 
 
 @pytest.mark.slow
@@ -101,9 +102,10 @@ def test_more_starts_are_improved_until_two_end_alike_and_what_ends_at_the_model
         assert isinstance(one, Started) and one.others
         improved, calls = BySquares.improved, list[float]()
 
-        def spied(self: BySquares, start: State, rounds: int = 12, to_reach: float = np.inf) -> tuple[float, State]:
+        def spied(self: BySquares, start: State, rounds: int = 12, to_reach: float = np.inf, later: int = 0
+                  ) -> tuple[float, State]:
             calls.append(to_reach)
-            return improved(self, start, rounds, to_reach)
+            return improved(self, start, rounds, to_reach, later=later)
 
         monkeypatch.setattr(BySquares, "improved", spied)
         (least, there), *_ = one.ends
@@ -129,7 +131,8 @@ def test_refinements_are_followed_where_they_may_explain_most_of_what_the_plain_
 
     def ends_at(plain: float, refined: float) -> list[bool]:
         """The forms of which cars are improved, if they end so, and then those of which one is fitted."""
-        def improved(self: BySquares, start: State, rounds: int = 12, to_reach: float = np.inf) -> tuple[float, State]:
+        def improved(self: BySquares, start: State, rounds: int = 12, to_reach: float = np.inf, later: int = 0
+                     ) -> tuple[float, State]:
             is_plain = not start.effects or start.effects[-1].is_plain
             calls.append((is_plain, to_reach))
             return (plain if is_plain else refined) if start.effects else begun, start

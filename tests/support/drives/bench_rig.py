@@ -25,7 +25,8 @@ SLIP_MPS = 1e-4
 @dataclass(frozen=True)
 class Rig:
     """Masses [kg], springs [N/m], the damper [N s/m], dry friction [N] in the suspension, the
-    suspension's hardening [N/m3], friction of wheel and body against their guides [N], and the tire's damper [N s/m].
+    suspension's hardening [N/m3], friction of wheel and body against their guides [N], the tire's damper [N s/m], and
+    the play of the suspension's spring, either way [m].
     """
 
     body_kg: float = 2.5
@@ -38,6 +39,7 @@ class Rig:
     wheel_guide_n: float = 0.0
     body_guide_n: float = 0.0
     tire_damper: float = 0.0
+    gap_m: float = 0.0
 
     def vehicle_yaml(self, off: float = 1.0) -> str:
         """Its file, with masses and springs that are ``off`` by a factor; of friction it says nothing."""
@@ -83,8 +85,8 @@ def shaken(rig: Rig, elevation_m: Array) -> Recorded:
 
     def forces(t: Any, x: Any) -> tuple[Any, Any]:
         travel, rate = x[0] - x[1], x[2] - x[3]
-        between = (rig.spring * travel + rig.cubic * travel**3 + rig.damper * rate
-                   + rig.friction_n * np.tanh(rate / SLIP_MPS))
+        between = (rig.spring * (travel - np.clip(travel, -rig.gap_m, rig.gap_m)) + rig.cubic * travel**3
+                   + rig.damper * rate + rig.friction_n * np.tanh(rate / SLIP_MPS))
         tire = rig.tire * (table(t) - x[1]) + rig.tire_damper * (table(t, 1) - x[3])
         return (-between - rig.body_guide_n * np.tanh(x[2] / SLIP_MPS),
                 between + tire - rig.wheel_guide_n * np.tanh(x[3] / SLIP_MPS))
