@@ -3,11 +3,13 @@ an integrator that shares nothing with ridelog (``support.drives.bench_rig``).""
 
 import json
 import shutil
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 from scipy.signal import butter, sosfiltfilt
 
 import ridelog
@@ -238,6 +240,19 @@ def test_all_signals_fall_to_their_noise(bench: Path, tmp_path: Path, capsys: py
     assert "Errors of the other signals: wheel_accel_mps2" in capsys.readouterr().out
     alone = reported(capsys, "compare", "--vehicle", bench / "rig.yaml", bench / "random")
     assert alone["signals"] == {}
+
+
+@pytest.mark.slow
+def test_a_recorder_with_a_clock_of_its_own_hides_nothing(bench: Path, tmp_path: Path,
+                                                          capsys: pytest.CaptureFixture[str]) -> None:
+    """80 ppm slow, as two crystals may differ: 30 s long, it begins right and is early by 1.2 ms in the mean."""
+    seen = randomly_shaken(Rig(), 30.0, 5)
+    early = CubicSpline(seen.time_s, seen.body_mps2)(seen.time_s * (1 + 8e-5))
+    write_run(tmp_path / "run", replace(seen, body_mps2=early), NOISE_MPS2, 3)
+    found = reported(capsys, "diagnose", "--vehicle", bench / "rig.yaml", tmp_path / "run")
+    assert found["verdict"] == ["time_offset"]
+    assert found["removed"]["distance"]["clock_ppm"] == pytest.approx(-80, abs=1)
+    assert found["steps"][-1]["error"] < 1.1 * found["noise_floor_error"]
 
 
 def test_signals_come_back_from_python(tmp_path: Path) -> None:

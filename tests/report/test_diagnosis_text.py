@@ -32,7 +32,7 @@ def candidate(name: str, p_value: float, gain: float, **values: float) -> Candid
 
 
 OTHERS = (candidate("tire_damping", 0.3, 8.0), candidate("sensor_gain", 1.0, -2.0))
-AS_USUAL = Removed((), 0.0, 0.0, 0.0, 0.0, 0.151)
+AS_USUAL = Removed((), 0.0, 0.0, 0.0, 0.0, 0.0, 0.151)
 NOTHING = LabDiagnosis(
     runs=("runs/a",), catalogue=EFFECTS, baseline_error=0.31, final_error=0.151, noise=NoiseLevel(0.05, 0.001),
     noise_floor_error=0.15, candidates=OTHERS, obstacles={}, verdict=(), excess=0.02, beyond={}, in_conflict=False,

@@ -78,6 +78,10 @@ def removed_words(found: Removed, band: ComparedBand | None) -> list[str]:
         lines.append(f"The distances of these runs are off by up to {found.distance_error_m:.2g} m, more than usual. "
                      f"This causes {percent(found.distance_share)} of the residual's power before any fit; the fits "
                      "correct it.")
+    if found.clock_ppm:
+        lines.append(f"The recorder's clock runs {abs(found.clock_ppm):.2g} ppm "
+                     f"{'faster' if found.clock_ppm > 0 else 'slower'} than that of the excitation. This causes "
+                     f"{percent(found.distance_share)} of the residual's power before any fit; the fits correct it.")
     if found.drifting_sensors:
         lines.append(f"The sensor drifts ({drift_words(found)}). The motion does not cause the drift, which makes up "
                      f"{percent(found.drift_share)} of the residual's power before any fit. The lab ignores all "
@@ -104,7 +108,8 @@ def removed_json(found: Removed) -> dict[str, Any]:
             "drift": {"error_power_share": found.drift_share, "judged_from_hz": LOWEST_HZ, "runs": [
                 {"run": one.run, "form": one.form, "size_mps2": one.size_mps2, "time_s": one.time_s}
                 for one in found.drifts]},
-            "distance": {"error_power_share": found.distance_share, "off_m": found.distance_error_m},
+            "distance": {"error_power_share": found.distance_share, "off_m": found.distance_error_m,
+                         "clock_ppm": found.clock_ppm},
             "filter": {"error_power_share": found.filter_share},
         },
         "error_without_drift": found.error,
@@ -118,6 +123,8 @@ def removed_section(found: Removed, band: ComparedBand | None) -> Detail:
         rows.append(("sensor drift", percent(found.drift_share), drift_words(found)))
     if found.distance_error_m > 0:
         rows.append(("wrong distances", percent(found.distance_share), f"up to {found.distance_error_m:.2g} m"))
+    if found.clock_ppm:
+        rows.append(("another clock", percent(found.distance_share), f"{found.clock_ppm:+.2g} ppm"))
     if band is not None:
         rows.append(("outside the pass band", percent(found.filter_share),
                      f"compared from {band.low_hz:.3g} to {band.high_hz:.3g} Hz"))

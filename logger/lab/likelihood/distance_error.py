@@ -24,7 +24,7 @@ import numpy as np
 from logger.arrays import Array
 from logger.bounds import CONFLICT_SIGMA, UNUSUAL_SIGMA
 from logger.lab.likelihood.priors import Tolerance
-from logger.runs import RECEIVER_ERROR_LASTS_S, SENSOR, SLOWEST_MPS, Run
+from logger.runs import RECEIVER_ERROR_LASTS_S, SENSOR, SLOWEST_MPS, Past, Run
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_array
@@ -186,6 +186,11 @@ class RecordError:
         usual = usual_size(self.run)
         return size.start_m * (usual.start_m / USUAL.start_m), size.walk_m * (usual.walk_m / USUAL.walk_m)
 
+    @property
+    def _pace(self) -> Array:
+        """What the numbers of the distance move, by time (n,) [m/s]."""
+        return np.maximum(self.run.speed_mps, SLOWEST_MPS)
+
     @cached_property
     def _walk_precision(self) -> Array:
         """Precision (k, k) of a random walk with steps of unit variance."""
@@ -252,7 +257,7 @@ class RecordError:
         n, found, count = self.run.count, [], len(self._recorder_deviations)
         for signal, start in enumerate(range(0, len(prediction), n)):
             rise = derivative(prediction[start : start + n], self.run.rate_hz)
-            by_place = rise / np.maximum(self.run.speed_mps, SLOWEST_MPS)
+            by_place = rise / self._pace
             moved = csr_array((self.basis.data * by_place[self.basis.indices], self.basis.indices, self.basis.indptr),
                               self.basis.shape)
             recorded = np.zeros((count, n))
@@ -267,9 +272,18 @@ class RecordError:
 
 
 class RigRecordError(RecordError):
-    """Errors of the record of a run on a rig: numbers k of its recorder and signals alone. What moves a rig is
-    recorded by the same clock as what the rig does, so that there is no distance error; one that was fitted
-    nevertheless would absorb physics. Methods as of ``RecordError``."""
+    """Errors of the record of a run on a rig: numbers k of its clock, its recorder and signals. What moves a rig and
+    what the rig does may be recorded by two clocks, one of which runs a little faster: the record lies right in its
+    middle. There is no distance error: one that was fitted nevertheless would absorb physics. Methods as of
+    ``RecordError``."""
+
+    @staticmethod
+    def of(run: Run, tolerance: Tolerance, scale_std: float = 0.0) -> RigRecordError:
+        """The record error of a run; ``scale_std`` as of ``RecordError``."""
+        from scipy.sparse import csr_array
+
+        from_middle_s = (np.arange(run.count) - 0.5 * (run.count - 1)) / run.rate_hz
+        return RigRecordError(run, csr_array(from_middle_s[None]), tolerance, 1.0, None, scale_std)
 
     @property
     def spline_count(self) -> int:
@@ -279,17 +293,37 @@ class RigRecordError(RecordError):
     def trend(self) -> Array:
         return np.empty((self.count, 0))
 
+    @property
+    def _deviations(self) -> Array:
+        """Standard deviations of k. What nothing drives has no second clock."""
+        clock = _HELD if self.run.past is Past.FREE else 1.0
+        return np.array([*[clock * self.tolerance.clock] * self.places, *self._recorder_deviations])
+
+    @property
+    def _pace(self) -> Array:
+        return np.ones(self.run.count)
+
     def precision(self, size: ErrorSize) -> Array:
-        return np.diag(self._recorder_deviations**-2)
+        return np.diag(self._deviations**-2)
 
     def trend_precisions(self, size: ErrorSize) -> Array:
         return np.empty(0)
 
     def log_determinant(self, size: ErrorSize) -> float:
-        return -2 * float(np.log(self._recorder_deviations).sum())
+        return -2 * float(np.log(self._deviations).sum())
 
     def distance_error_m(self, k: Array) -> Array:
         return np.zeros(self.run.count)
+
+    def with_recorder_error(self, prediction: Array, k: Array) -> Array:
+        """As of ``RecordError``; a clock moves by so little that two terms of Taylor's series are enough."""
+        if k[: self.places].any():
+            late_s, rate_hz = k[0] * self.basis.toarray()[0], self.run.rate_hz
+            signals = prediction.reshape(-1, self.run.count)
+            rises = np.stack([derivative(one, rate_hz) for one in signals])
+            bends = np.stack([derivative(one, rate_hz) for one in rises])
+            prediction = (signals + late_s * rises + 0.5 * late_s**2 * bends).ravel()
+        return super().with_recorder_error(prediction, k)
 
     def without_trend(self, k: Array) -> Array:
         return k
@@ -300,10 +334,7 @@ class RigRecordError(RecordError):
 
 def record_error(run: Run, tolerance: Tolerance, scale_std: float = 0.0) -> RecordError:
     """The record error of a run, on a road or on a rig; ``scale_std`` as of ``RecordError``."""
-    from scipy.sparse import csr_array
-
-    return RigRecordError(run, csr_array((0, run.count)), tolerance, 1.0, None, scale_std) if run.timed else (
-        RecordError.of(run, tolerance))
+    return RigRecordError.of(run, tolerance, scale_std) if run.timed else RecordError.of(run, tolerance)
 
 
 def zero_of(errors: Sequence[RecordError], record: Sequence[Array]) -> tuple[float, list[Array]]:

@@ -31,6 +31,7 @@ class Tolerance:
                  with its mounting; of an encoder, which counts, a tenth of that (judgements)
     droop        of what a recorder takes away from a frequency, over its square as a share of the rate (the mean over
                  each sample takes 1.6; a filter that ripples by 0.1 dB some tenths)
+    clock        rate of a rig's recorder over that of what drives it, less 1: quartz crystals of +- 50 ppm each
     band         in which numbers may well be, in these deviations: 20 % either way have 12.5 %
     by_name      of numbers of which the vehicle's file says how well they are known
     """
@@ -40,6 +41,7 @@ class Tolerance:
     gain: float = 0.005
     scale: float = 0.01
     droop: float = 0.4
+    clock: float = 4e-5
     band: float = 1.6
     by_name: Mapping[str, float] = field(default_factory=dict)
 
