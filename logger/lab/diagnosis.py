@@ -42,7 +42,7 @@ from logger.lab.selection.detectability import Undetectable, effect_as_moved, un
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION, INDISTINGUISHABLE
 from logger.lab.selection.filter_without_delay import below_filter_without_delay
 from logger.lab.selection.holdout import AS_FILED, REFITTED, ErrorStep, HoldOut, cross_validate
-from logger.lab.selection.screening import Baseline, Screened, misalignment
+from logger.lab.selection.screening import Baseline, Screened, effects_without, misalignment
 from logger.lab.selection.starts import UnknownNumbers, needs_starts
 from logger.lab.selection.stepwise import F, M, MeasuredRoad, P, Search, SearchEffort, Selection, is_outside_data
 from logger.runs import BY_ROAD, Past, are_on_rig
@@ -428,8 +428,10 @@ def obstacles_of(posterior: Posterior, effects: Mapping[str, Effect], present: S
 def _fit_finely(search: Search, selection: Selection) -> tuple[Selection, LinearModel]:
     """The model that was found, fitted by fine simulations. Effects that are at an end of their range then are dropped,
     and what they imitated is sought without them (a damper whose knee goes to 0 is friction). Dropped are those, too,
-    that are not unusually far from doing nothing: they made up for the roughness of the search's simulations (a delay
-    beside dry friction, whose force comes part of a step late)."""
+    that are not unusually far from doing nothing and gain no more than chance: they made up for the roughness of the
+    search's simulations (a delay beside dry friction, whose force comes part of a step late). What does nearly the same
+    as the car's own numbers has large standard errors however much it gains (W. Hauck and A. Donner, Journal of the
+    American Statistical Association 72, 1977)."""
     search.progress("fitting it finely")
     posterior = selection.before.posterior
     fine = posterior.simulated(steps_hz(posterior.vehicle))
@@ -447,9 +449,18 @@ def _fit_finely(search: Search, selection: Selection) -> tuple[Selection, Linear
             far = {one.effect.name: deviations_from_null(one, errors.numbers)
                    for one in errors.effects[search.present:]}
             weakest = min(far, key=far.__getitem__, default=None)
-            if weakest is None or far[weakest] > UNUSUAL_SIGMA:
+            if weakest is None or far[weakest] > UNUSUAL_SIGMA or _is_evident(search, selection.before, after, weakest):
                 return selection, after
             selection = search.without_effect(selection, weakest)
+
+
+def _is_evident(search: Search, before: Baseline, after: LinearModel, name: str) -> bool:
+    """Whether one of a model's effects gains more than chance would."""
+    fine, state = after.posterior, after.state
+    one = next(each for each in state.effects if each.effect.name == name)
+    rest = fit_model(fine, fine.state_at(effects_without(state, name), state.logs, state.record, state.size),
+                     after.numbers)
+    return search.likelihood.chance(one, rest.score - after.score, before, len(search.effects)) < FALSE_ALARM
 
 
 def _steps(selection: Selection, nominal_error: float) -> tuple[ErrorStep, ...]:

@@ -42,12 +42,12 @@ def show(figures: Figures, name: str, folder: Path) -> None:
         raise SystemExit(found.stderr)
     for table in json.loads(found.stdout)["tables"][:2]:
         for row in (dict(zip(table["columns"], one, strict=True)) for one in table["rows"]):
-            words, ours = row["value" if "value" in row else "figure"], row["ours"]
+            words, ours = row["value" if "value" in row else "figure"], row["ridelog"]
             goal = GOALS[name].get(words)
             if goal is None:
                 figures.at_least(words, ours, 1.0, "")
             elif "value" in row and name == "emps":
-                figures.at_most(f"{words}, apart from the published", abs(ours / row["printed"] - 1), goal, "")
+                figures.at_most(f"{words}, apart from the published", abs(ours / row["published"] - 1), goal, "")
             else:
                 figures.at_most(words, ours, goal, "")
 

@@ -106,6 +106,13 @@ def test_what_is_missing_is_named_with_its_numbers_and_errors(offset: LabDiagnos
     assert best.confused_with == ()
 
 
+@pytest.mark.slow
+def test_what_gains_is_named_however_large_its_standard_error(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As of a friction that grows over all rates there are: a damper does nearly the same."""
+    monkeypatch.setattr("logger.lab.diagnosis.deviations_from_null", lambda *_: 0.5)
+    assert diagnosed(secret_runs([hidden("sensor_offset", offset_m=0.4)])).verdict == ("sensor_offset",)
+
+
 def test_errors_on_what_no_fit_saw_fall_on_the_way(offset: LabDiagnosis) -> None:
     words = [step.words for step in offset.steps]
     assert words == ["the vehicle's file unchanged", "its parameters refitted", "with sensor_offset"]
