@@ -593,11 +593,14 @@ def bench_sections(found: LabDiagnosis) -> list[Section]:
     if found.car is None or (part := found.car.on_bench) is None:
         return []
     few = -(-len(part.travel_m) // MOST_DOTS)
+    forces = {"measured": part.measured_n, "file unchanged": part.before_n, "refitted": part.after_n}
+    if not found.steps[0].error < 1:  # a file of unknown numbers is farther off than no force at all
+        del forces["file unchanged"]
     return [Section("Force by velocity and by travel", [
         Curves(f"Force by {name}", f"{name} [{unit}], positive in extension", "force [N]", tuple(
-            Line(words, at[::step], force_n[::step], dots=True)  # fewer of the model, so that both are seen
-            for words, step, force_n in (("measured", few, part.measured_n), ("file unchanged", 3 * few, part.before_n),
-                                         ("refitted", 3 * few, part.after_n))))
+            # Fewer of the model, so that both are seen.
+            Line(words, at[:: (step := few if words == "measured" else 3 * few)], force_n[::step], dots=True)
+            for words, force_n in forces.items()))
         for name, unit, at in (("velocity", "m/s", part.rate_mps), ("travel", "mm", 1000 * part.travel_m))])]
 
 
