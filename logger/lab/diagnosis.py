@@ -273,7 +273,7 @@ def search_to_the_last(posterior: Posterior, effects: Mapping[str, Effect], pres
     tried = {name: one for name, one in last.items() if name not in obstacles_of(posterior, last, present)}
     if not (tried and (found.diagnosis.exceeds_noise or found.diagnosis.within_calibration)):
         return found
-    if search.stops_before(last_names := " and ".join(tried), 1.0):
+    if search.likelihood.stops_before(last_names := " and ".join(tried)):
         return replace(found, diagnosis=replace(found.diagnosis, not_searched=(
             *found.diagnosis.not_searched, last_names)))
     progress(f"something is left unexplained: searching with {last_names}, too")
@@ -311,8 +311,6 @@ def begin_search(posterior: Posterior, effects: Mapping[str, Effect], present: S
         # Of a part, whose motion is given, fits take a hundredth of those of a car.
         effort=SearchEffort(beginnings=2 * before.is_part) if unknown is None else SearchEffort(fitted=3),
         likelihood=unknown or MeasuredRoad())
-    if unknown is not None:
-        search.stops_before = unknown.stops_before
     return search, before
 
 
@@ -324,6 +322,7 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
     nominal = posterior.start(present)
     fine, state = after.posterior, after.state
     noise = sensor_noise_with_rounding(fine, state)
+    starts = search.likelihood if isinstance(search.likelihood, UnknownNumbers) else UnknownNumbers()
     progress("standard errors of the parameters")
     errors = standard_errors(after)
     progress("what these runs could not show")
@@ -358,8 +357,7 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
         moved={name: one for name, one in fine.prior.moved(
             state.logs, errors.covariance, fine.shows_forces).items() if name not in {**beyond, **left_open}},
         left_open=left_open,
-        ends=search.likelihood.ends if isinstance(search.likelihood, UnknownNumbers) else {},
-        not_searched=tuple(search.likelihood.not_tried) if isinstance(search.likelihood, UnknownNumbers) else (),
+        ends=starts.ends, not_searched=tuple(starts.not_tried),
         as_moved=effect_as_moved(after, [one for one in tried if one.name not in state.names], left_open),
         steps=_steps(selection, posterior.error(nominal)),
         effects=errors.effects,
@@ -449,12 +447,13 @@ def _fit_finely(search: Search, selection: Selection) -> tuple[Selection, Linear
             far = {one.effect.name: deviations_from_null(one, errors.numbers)
                    for one in errors.effects[search.present:]}
             weakest = min(far, key=far.__getitem__, default=None)
-            if weakest is None or far[weakest] > UNUSUAL_SIGMA or _is_evident(search, selection.before, after, weakest):
+            if weakest is None or far[weakest] > UNUSUAL_SIGMA or _gains_more_than_chance(
+                    search, selection.before, after, weakest):
                 return selection, after
             selection = search.without_effect(selection, weakest)
 
 
-def _is_evident(search: Search, before: Baseline, after: LinearModel, name: str) -> bool:
+def _gains_more_than_chance(search: Search, before: Baseline, after: LinearModel, name: str) -> bool:
     """Whether one of a model's effects gains more than chance would."""
     fine, state = after.posterior, after.state
     one = next(each for each in state.effects if each.effect.name == name)

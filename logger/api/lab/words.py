@@ -74,14 +74,14 @@ def removed_words(found: Removed, band: ComparedBand | None) -> list[str]:
     lines = band_words(band)
     if found.filter_share > 0 and lines:
         lines[0] += f" {percent(found.filter_share)} of the residual's power lies outside that band."
+    corrected = (f"This causes {percent(found.distance_share)} of the residual's power before any fit; the fits "
+                 "correct it.")
     if found.distance_error_m > 0:
         lines.append(f"The distances of these runs are off by up to {found.distance_error_m:.2g} m, more than usual. "
-                     f"This causes {percent(found.distance_share)} of the residual's power before any fit; the fits "
-                     "correct it.")
+                     f"{corrected}")
     if found.clock_ppm:
         lines.append(f"The recorder's clock runs {abs(found.clock_ppm):.2g} ppm "
-                     f"{'faster' if found.clock_ppm > 0 else 'slower'} than that of the excitation. This causes "
-                     f"{percent(found.distance_share)} of the residual's power before any fit; the fits correct it.")
+                     f"{'faster' if found.clock_ppm > 0 else 'slower'} than that of the excitation. {corrected}")
     if found.drifting_sensors:
         lines.append(f"The sensor drifts ({drift_words(found)}). The motion does not cause the drift, which makes up "
                      f"{percent(found.drift_share)} of the residual's power before any fit. The lab ignores all "

@@ -32,7 +32,7 @@ from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly
 from logger.lab.selection.evidence import IMITATION, INDISTINGUISHABLE
 from logger.lab.selection.holdout import most_of
 from logger.lab.selection.screening import Baseline, Screened, Trial, effects_without
-from logger.lab.selection.stepwise import MeasuredRoad, Progress, SearchEffort, is_outside_data
+from logger.lab.selection.stepwise import MeasuredRoad, Progress, Search, SearchEffort, is_outside_data
 from logger.simulation.virtual_drive import SEARCH_HZ, SimulatedRuns
 from logger.vehicle.effect import Chosen, Effect, Misalignment, Sought, chosen
 from logger.vehicle.models import structure_of
@@ -58,7 +58,7 @@ class Started(Screened):
     others: Sequence[_Drawn]
     ends: Sequence[_Drawn]
     gain_by_squares: float
-    known: float = np.inf
+    known: float
 
     @property
     def gain(self) -> float:
@@ -75,7 +75,7 @@ class UnknownNumbers(MeasuredRoad):
                  around the fitted one, which lie in its valley
     starts       so many of those without an effect, or where others have shown the car, are improved to the end
     most         work of simulations (``SimulatedRuns.work``) after which a search takes no further step: about 80 s of
-                 a processor. A round draws cars until three quarters of it are done or, where they are, a sixth more.
+                 a processor. A round draws cars until ``Search.share`` of it is done or, where it is, a sixth more.
                  Judgements
     ends         of how many of these the fit of an effect ended at the best, by name
     not_tried    what a search stopped before
@@ -95,9 +95,13 @@ class UnknownNumbers(MeasuredRoad):
 
     def stops_before(self, what: str, share: float = 1.0) -> bool:
         """Whether a search has simulated this share of what it may, and does not try something."""
-        if (stops := self._done() > share * self.most) and what not in self.not_tried:
-            self.not_tried.append(what)
+        if stops := self._done() > share * self.most:
+            self._leave_out(what)
         return stops
+
+    def _leave_out(self, what: str) -> None:
+        if what not in self.not_tried:
+            self.not_tried.append(what)
 
     def _done(self) -> int:
         return 0 if self._runs is None else self._runs.work - self._begun
@@ -134,7 +138,7 @@ class UnknownNumbers(MeasuredRoad):
                 least = min(known, least)
                 numbers = best.logs if self._shows_the_car(by_squares, anchor, best) else None
         found: list[Screened] = []
-        enough, later = max(0.75 * self.most, self._done() + self.most / 6), list[str]()
+        enough, later = max(Search.share * self.most, self._done() + self.most / 6), list[str]()
         for one in local:
             if self._done() > enough:
                 found.append(one)
@@ -160,8 +164,8 @@ class UnknownNumbers(MeasuredRoad):
             if ends and ends[0][0] < least and not is_outside_data(base.posterior, ends[0][1].effects[-1]):
                 least, best = ends[0]
                 numbers = best.logs if self._shows_the_car(by_squares, anchor, best) else None
-        if later and (what := f"other starting points of {', '.join(sorted(later))}") not in self.not_tried:
-            self.not_tried.append(what)
+        if later:
+            self._leave_out(f"other starting points of {', '.join(sorted(later))}")
         self._keep(*(one.ends for one in found if isinstance(one, Started)))
         return sorted(found, key=lambda one: -one.gain)
 

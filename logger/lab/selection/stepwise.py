@@ -186,6 +186,10 @@ class Likelihood(Protocol[M, P, F]):
         """Whether an effect imitates a part of anything, and it shows whether it explains most of it."""
         return False
 
+    def stops_before(self, what: str, share: float = 1.0) -> bool:
+        """Whether a search has done this share of all that it may, so that it does not try something."""
+        return False
+
 
 class MeasuredRoad:
     """The likelihood of drives over a road that was measured."""
@@ -279,6 +283,10 @@ class MeasuredRoad:
         """As the effect says."""
         return one.imitates_any
 
+    def stops_before(self, what: str, share: float = 1.0) -> bool:
+        """A search takes as long as it takes."""
+        return False
+
 
 @dataclass(frozen=True, eq=False)
 class SearchRound(Generic[P, F]):
@@ -321,8 +329,7 @@ class Selection(Generic[M, P, F]):
 class Search(Generic[M, P, F]):
     """A search among effects, on models whose first ``present`` effects are given.
 
-    stops_before    whether this share of all that a search may do is done, so that it does not try something
-    share           that this one may do; a quarter is kept for effects that are tried last
+    share    that it may do of all that a search may; a quarter is kept for effects that are tried last
     """
 
     effects: Sequence[Effect]
@@ -332,7 +339,6 @@ class Search(Generic[M, P, F]):
     workers: int = 2
     effort: SearchEffort = SearchEffort()
     likelihood: Likelihood[Any, Any, Any] = field(default_factory=MeasuredRoad)
-    stops_before: Callable[[str, float], bool] = lambda what, share: False
     share: float = 0.75
     _promising: set[str] = field(default_factory=set)
     _rivals: dict[str, tuple[str, ...]] = field(default_factory=dict)
@@ -356,7 +362,7 @@ class Search(Generic[M, P, F]):
         may imitate others together: these are sought without that effect, and taken where they are likelier."""
         found = self._begun_otherwise(self._begun(before))
         refined = [one.effect for one in found.now.effects[self.present:] if not one.is_plain]
-        if not refined or not self._leaves_more_than_noise(found.now) or self.stops_before(_OTHERS, self.share):
+        if not refined or not self._leaves_more_than_noise(found.now) or self._stops_before(_OTHERS):
             return found
         self.progress(f"is it {' and '.join(one.name for one in refined)}, or others together?")
         rest = replace(self, effects=[one for one in self.effects if one not in refined], _promising=set(), _rivals={})
@@ -388,6 +394,9 @@ class Search(Generic[M, P, F]):
                     _, found = rest.with_more(other, [one for one in self.effects if one not in rest.effects])
         return found
 
+    def _stops_before(self, what: str) -> bool:
+        return self.likelihood.stops_before(what, self.share)
+
     def _leaves_more_than_noise(self, now: M) -> bool:
         return now.explanation > 0 and not (self.likelihood.leaves_noise(now) or self.likelihood.is_at_floor(now))
 
@@ -402,7 +411,7 @@ class Search(Generic[M, P, F]):
         last, asked = begun.last, set[str]()
         while len((now := self._refined(now)).effects) - self.present < self.effort.effects:
             untried = [one for one in self.effects if one.name not in names_of(now)]
-            if not untried or (len(steps) > len(begun.steps) and self.stops_before(_MORE, self.share)):
+            if not untried or (len(steps) > len(begun.steps) and self._stops_before(_MORE)):
                 break
             self.progress(f"round {len(steps) + 1}")
             new = [one.effect.name for one in now.effects[self.present:]
@@ -694,7 +703,7 @@ class Search(Generic[M, P, F]):
         here = next(one for one in now.effects if one.effect.name == name)
         may_be = [one for one in self.effects if one.name not in names_of(now) and (
             shared_parameters(one, here.values) or (added_to is None and one.name in self._promising))]
-        if not may_be if added_to is not None else self.stops_before(_OTHERS, self.share):
+        if not may_be if added_to is not None else self._stops_before(_OTHERS):
             return now
         self.progress(f"fitting {name} again" if added_to is None else
                       f"is it {name}, or {' or '.join(one.name for one in may_be)}?")

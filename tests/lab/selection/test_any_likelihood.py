@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import Any
@@ -68,6 +68,10 @@ class MadeUp:
     refined_from: int = 1
     frees: tuple[str, ...] = tuple(WORTH)
     fitted: list[tuple[str, int]] = field(default_factory=list)
+    stops: Callable[[str, float], bool] = lambda what, share: False
+
+    def stops_before(self, what: str, share: float = 1.0) -> bool:
+        return self.stops(what, share)
 
     def screened(self, base: Made, effects: Sequence[Effect], seen: Misalignment, near: Chosen | None,
                  pool: ThreadPoolExecutor, progress: Progress) -> list[Tried]:
@@ -287,10 +291,11 @@ def test_what_refinements_imitate_together_is_found_without_their_effect_unless_
 
 
 def test_a_search_that_stops_keeps_what_it_has_found() -> None:
-    sought, asked = search(), list[str]()
-    sought.stops_before = lambda what, share: asked.append(what) or True  # type: ignore[func-returns-value]
+    asked = list[str]()
+    sought = replace(search(), likelihood=MadeUp(
+        stops=lambda what, share: asked.append(what) or True))  # type: ignore[func-returns-value]
     assert [*sought.run(Made()).gains] == ["sensor_gain"] and asked == ["one more effect"]
-    sought.stops_before = lambda what, share: share < 1 and "place" in what
+    sought = replace(search(), likelihood=MadeUp(stops=lambda what, share: share < 1 and "place" in what))
     assert [*sought.run(Made()).gains] == [*search().run(Made()).gains]
 
 
