@@ -26,7 +26,11 @@ def dataset(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.mark.slow
 @pytest.mark.skipif(not HAS_SPARK, reason=NO_SPARK)
 @pytest.mark.filterwarnings("ignore")  # of PySpark and of what it finds in this machine's Java
-def test_spark_gives_the_same_figures(dataset: Path) -> None:
+def test_spark_gives_the_same_figures(dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Few rows: two parts in the place of 200, and no second compilation of what runs once.
+    (tmp_path / "spark-defaults.conf").write_text("spark.sql.shuffle.partitions 2\n")
+    monkeypatch.setenv("SPARK_CONF_DIR", str(tmp_path))
+    monkeypatch.setenv("JAVA_TOOL_OPTIONS", "-XX:TieredStopAtLevel=1 -XX:+UseSerialGC")
     ours, theirs = (fleet_summarise(dataset, by="section", since="2024-03-01", engine=one).found
                     for one in ("duckdb", "spark local-cluster[2,1,1024]"))
     assert (ours.windows, ours.withheld, ours.cars.tolist()) == (theirs.windows, theirs.withheld, theirs.cars.tolist())
