@@ -31,6 +31,7 @@ was found; what one without delay does there is within the tolerance of any reco
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -100,7 +101,7 @@ def detect_low_passes(runs: Sequence[Run], predictions: Sequence[Array]) -> list
 
     predictions    (n,) per run, of a model that is about right; distance errors do not matter
     """
-    fits = [_fits(run, prediction) for run, prediction in zip(runs, predictions, strict=True)]
+    fits = [_Fits(run, prediction) for run, prediction in zip(runs, predictions, strict=True)]
     common = _detect_low_pass(fits, runs[0].rate_hz, common=True)
     if common is not None and all(_is_consistent(one, common, runs[0].rate_hz) for one in fits):
         common = replace(common, causal=_is_causal(runs, predictions, common))
@@ -198,12 +199,15 @@ def compared_band(runs: Sequence[Run]) -> ComparedBand | None:
 def _detect_low_pass(fits: "Sequence[_Fits]", rate_hz: float, common: bool) -> LowPass | None:
     """The low-pass that some runs went through; None: none. ``common``: they are all the runs of one recorder."""
     plain = sum(one.plain * one.size for one in fits)
+    at_most = plain - np.log(10) / 10 * _BETTER_DB * sum(one.size for one in fits)
+    if at_most < 0:
+        return None
     table = sum((one.filtered * one.size for one in fits), np.zeros_like(fits[0].filtered))
     place = np.unravel_index(int(table.argmin()), table.shape)
-    size, misfit = sum(one.size for one in fits), float(table[place])
-    if sum(one.by_effects * one.size for one in fits) < (_NO_WORSE if common else _BETTER) * misfit:
+    misfit = float(table[place])
+    if misfit > min(at_most, plain / _BETTER):
         return None
-    if plain < _BETTER * misfit or 10 / np.log(10) * (plain - misfit) < _BETTER_DB * size:
+    if sum(one.by_effects * one.size for one in fits) < (_NO_WORSE if common else _BETTER) * misfit:
         return None
     return LowPass(float(_cutoffs_hz(rate_hz)[place[0]]), float(_ORDERS[place[1]]))
 
@@ -264,36 +268,40 @@ def _is_consistent(fits: "_Fits", seen: LowPass, rate_hz: float) -> bool:
     return bool(fits.filtered[np.ix_(near, as_steep)].min() <= fits.plain + _SAME_MISFIT)
 
 
-@dataclass(frozen=True, eq=False)
 class _Fits:
-    """Misfits of log S of a run, in the bands that hold anything: without a filter, with the best of the effects that
-    imitate one, and with each filter (cut-offs, orders); and how many samples the run has."""
+    """Misfits of log S of a run, in the bands that hold anything: the tables of many only where somebody asks."""
 
-    plain: float
-    by_effects: float
-    filtered: Array
-    size: int
+    def __init__(self, run: Run, prediction: Array) -> None:
+        (measured, nothing_measured), (model, nothing_predicted) = (
+            _spectrum(run, one) for one in (run.measured_mps2, prediction))
+        self._used = ~(nothing_measured & nothing_predicted)
+        self._middles_hz = np.asarray(_LOWEST_HZ + _WIDTH_HZ * (np.arange(len(measured)) + 0.5), float)
+        self._behind = 0.97 * measured.min()  # the quietest of so many bands lies a little below its mean
+        gains = _GAINS * np.median((measured / model)[:6])  # up to 10 Hz
+        through = np.append(0.0, np.geomspace(self._behind, np.median(measured[self._used]), _NOISES))
+        self._made = (gains[:, None, None] * model + through[:, None]).reshape(-1, len(model))
+        self._target = np.log(measured)
+        self._rate_hz = run.rate_hz
+        self.size = run.count - run.first
+        """Samples of the run."""
+        self.plain = float(self._misfit(self._made))
+        """Without a filter."""
 
+    def _misfit(self, power: Array) -> Array:
+        off = np.abs(np.log(power + self._behind) - self._target)
+        return np.asarray(off.sum(axis=-1).min(axis=-1) / self._used.sum())
 
-def _fits(run: Run, prediction: Array) -> _Fits:
-    """Misfits of a run's spectrum."""
-    (measured, nothing_measured), (model, nothing_predicted) = (
-        _spectrum(run, one) for one in (run.measured_mps2, prediction))
-    used = ~(nothing_measured & nothing_predicted)
-    middles = np.asarray(_LOWEST_HZ + _WIDTH_HZ * (np.arange(len(measured)) + 0.5), float)
-    behind = 0.97 * measured.min()  # the quietest of so many bands lies a little below its mean
-    gains = _GAINS * np.median((measured / model)[:6])  # up to 10 Hz
-    through = np.append(0.0, np.geomspace(behind, np.median(measured[used]), _NOISES))
-    made = (gains[:, None, None] * model + through[:, None]).reshape(-1, len(model))
-    target = np.log(measured)
+    @cached_property
+    def filtered(self) -> Array:
+        """With each filter (cut-offs, orders)."""
+        x = np.tan(np.pi * self._middles_hz / self._rate_hz) / np.tan(
+            np.pi * _cutoffs_hz(self._rate_hz)[:, None, None] / self._rate_hz)
+        return np.stack([self._misfit(self._made / (1 + x ** (2 * order))) for order in _ORDERS], axis=1)
 
-    def misfit(power: Array) -> Array:
-        return np.asarray(np.abs(np.log(power + behind) - target).sum(axis=-1).min(axis=-1) / used.sum())
-
-    x = np.tan(np.pi * middles / run.rate_hz) / np.tan(np.pi * _cutoffs_hz(run.rate_hz)[:, None] / run.rate_hz)
-    tables = [misfit(made / (1 + x[:, None, :] ** (2 * order))) for order in _ORDERS]
-    by_effects = min(float(misfit(made * one).min()) for one in _effects_alone(middles))
-    return _Fits(float(misfit(made)), by_effects, np.stack(tables, axis=1), run.count - run.first)
+    @cached_property
+    def by_effects(self) -> float:
+        """With the best of the effects that imitate a filter."""
+        return min(float(self._misfit(self._made * one).min()) for one in _effects_alone(self._middles_hz))
 
 
 def _effects_alone(f_hz: Array) -> Iterator[Array]:
