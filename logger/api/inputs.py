@@ -190,10 +190,9 @@ def effects() -> Effects:
 def check_forces(vehicle: Vehicle, track: Track | Excitation, said: str) -> None:
     """BadInput where a force, ``said`` in this file, acts on a part that the vehicle does not have, or what is moved is
     not what this vehicle is moved by."""
-    part = vehicle.model == "component"
-    if part != (past_of(track) is Past.OF_PART):
+    if vehicle.is_part != (past_of(track) is Past.OF_PART):
         raise BadInput(f"{Path(said).parent}: expected an excitation.csv with " + (
-            "t_s,displacement_m, as the vehicle is a part that its bench moves" if part else
+            "t_s,displacement_m, as the vehicle is a part that its bench moves" if vehicle.is_part else
             f"elevation_m or forces, found displacement_m, which moves a part alone: the vehicle is a "
             f"{vehicle.model.replace('_', ' ')}"))
     for one in track.forces if isinstance(track, Excitation) else ():

@@ -264,7 +264,7 @@ class Effect(ABC):
             return "it needs a rig that a measured force drives"
         if self.needs_wheel and vehicle.model in OWN_NAMES:
             return f"a {vehicle.model.replace('_', ' ')} has no wheel, no tire and no body that turns"
-        if (self.needs_body or self.against_ground) and vehicle.model == "component":
+        if (self.needs_body or self.against_ground) and vehicle.is_part:
             return "its bench moves it, whatever hangs on it"
         return ON_A_RIG if timed and self.needs_road else self.obstacle(vehicle, two_tracks)
 

@@ -187,7 +187,7 @@ def free(
     is_place = name == PRELOAD or name.startswith(f"{SENSOR}.")
     if not is_place and not (low > 0 and value > 0):
         raise ValueError(f"{name}: expected a start and bounds above 0, found {value:g} and {low:g} to {high:g}")
-    may_be_0 = name.endswith(_DAMPING) or (vehicle.model == "component" and name in OWN_NAMES["single_mass"])
+    may_be_0 = name.endswith(_DAMPING) or (vehicle.is_part and name in OWN_NAMES["single_mass"])
     return Free(name, value, low, high, is_place, known=known, may_be_0=bounds is None and may_be_0)
 
 

@@ -76,6 +76,11 @@ class Vehicle:
     sensor: SensorPlace = AT_CENTRE_OF_GRAVITY
     preload_n: float = 0.0
 
+    @property
+    def is_part(self) -> bool:
+        """Whether it is a part alone, whose motion its bench gives."""
+        return self.model == "component"
+
 
 def with_load(vehicle: Vehicle, extra_sprung_mass_kg: float) -> Vehicle:
     """The same car with more (or, negative, less) mass at its centre of gravity, such as people; inertias stay.

@@ -271,7 +271,7 @@ def known_effects(model: CarModel, files: Sequence[str], on_rig: bool = False, s
     scales    as ``sized``
     """
     own = dict[str, str]()
-    effects = _ready_for(model, on_rig, scales, sought_effects(on_rig, _is_part(model)))
+    effects = _ready_for(model, on_rig, scales, sought_effects(on_rig, model.vehicle.is_part))
     for one in model.effects:
         if one.file is not None:
             effects[one.effect.name], own[one.effect.name] = one.effect, one.file
@@ -286,14 +286,11 @@ def known_effects(model: CarModel, files: Sequence[str], on_rig: bool = False, s
     return effects, own
 
 
-def _is_part(model: CarModel) -> bool:
-    return model.vehicle.model == "component"
-
-
 def _ready_for(model: CarModel, on_rig: bool, scales: Scales | None, effects: Mapping[str, Effect]
                ) -> dict[str, Effect]:
     """Effects in the model's sizes, with advice that can be followed there."""
-    return {name: sized(_shown_on_rig(one.on(model.vehicle), _is_part(model)) if on_rig else one, model.vehicle, scales)
+    vehicle = model.vehicle
+    return {name: sized(_shown_on_rig(one.on(vehicle), vehicle.is_part) if on_rig else one, vehicle, scales)
             for name, one in effects.items()}
 
 

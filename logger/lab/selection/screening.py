@@ -104,7 +104,7 @@ class Baseline:
     @property
     def is_part(self) -> bool:
         """Whether it is of a part alone, whose motion its bench gives."""
-        return self.posterior.vehicle.model == "component"
+        return self.posterior.vehicle.is_part
 
     @property
     def posterior(self) -> Posterior:

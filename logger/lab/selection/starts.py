@@ -322,7 +322,7 @@ def _tuned(posterior: Posterior, logs: Array, hz: float) -> Array:
 def needs_starts(posterior: Posterior) -> bool:
     """Whether a fit may end in a wrong valley of the car's numbers: where they are not known, but for a part that its
     bench moves, whose force is linear in them."""
-    return posterior.prior.is_vague and posterior.vehicle.model != "component"
+    return posterior.prior.is_vague and not posterior.vehicle.is_part
 
 
 def fitted_from_starts(posterior: Posterior, present: Sequence[Chosen]) -> LinearModel:

@@ -130,7 +130,7 @@ def check_on_road(vehicle: Vehicle) -> None:
 
 def check_moves_itself(vehicle: Vehicle) -> None:
     """Raise BadInput for a part alone, which its bench moves: what it answers with is a force."""
-    if vehicle.model == "component":
+    if vehicle.is_part:
         raise BadInput(f"{vehicle.name}: expected a mass that moves, found model: component, which its bench moves")
 
 
@@ -174,7 +174,7 @@ def _read_given(node: Node, vehicle: Vehicle, known: dict[str, Known]) -> Vehicl
             keys[name] = replace(one, content=repr(read(vehicle, name)))
         else:
             keys[name] = _plain_number(one, name, known)
-    mass_kg = 0.0 if vehicle.model == "component" else vehicle.sprung_mass_kg
+    mass_kg = 0.0 if vehicle.is_part else vehicle.sprung_mass_kg
     wheelbase_m = 0.0 if vehicle.rear is None else vehicle.front.cg_distance_m + vehicle.rear.cg_distance_m
     is_car = _is_car_sized(wheelbase_m, vehicle.contact_patch_m)
     values = {name: _number_of({name.rpartition(".")[2]: one}, name.rpartition(".")[2], mass_kg, is_car)

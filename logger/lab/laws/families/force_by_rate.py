@@ -35,7 +35,7 @@ class ForceByRate(CurveFamily):
     ends = ((-1, "at the fastest"),)
 
     def more_drafts(self, context: LawContext, reach: Callable[[float], float], size_n: float) -> list[Draft]:
-        if context.vehicle.model != "component" or size_n == 0:
+        if not context.vehicle.is_part or size_n == 0:
             return []
         springs = tuple(rounded(size_n / (share * context.reach("travel_m", 0.9))) for share in (0.02, 0.2))
         spring = Parameter("spring_n_per_m", springs[0], springs[-1] / 100, springs[0] * 100, None, Scale.LOG, springs,

@@ -29,7 +29,7 @@ class Skyhook(Family):
     shown_by = "drive a road with long waves, on which the body bounces, and a short rough one, on which the wheels hop"
 
     def drafts(self, context: LawContext) -> list[Draft]:
-        if context.vehicle.model == "component":  # which has no body
+        if context.vehicle.is_part:  # which has no body
             return []
         own = context.vehicle.front.suspension_damping_n_s_per_m
         tried, most = tuple(rounded(share * own) for share in _TRIED), rounded(_MOST * own)

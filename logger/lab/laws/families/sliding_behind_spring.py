@@ -36,7 +36,7 @@ class SlidingBehindSpring(Family):
 
     def drafts(self, context: LawContext) -> list[Draft]:
         vehicle = context.vehicle
-        if vehicle.model != "component":
+        if not vehicle.is_part:
             return []
         front, travel_m, rate_mps = vehicle.front, context.reach("travel_m", 0.9), context.reach("rate_mps", 0.9)
         size_n = rounded(0.3 * (front.suspension_stiffness_n_per_m * travel_m
