@@ -267,7 +267,8 @@ places of the wheels (M, w) and the times (M,)."""
 def _compiled(function: Callable[..., Any]) -> Callable[..., Any]:
     """What runs in the loop and makes no arrays: it need not count who holds which, which would take most of its time.
     """
-    return _njit(function, forceinline=True, _nrt=False) if COMPILED else function
+    inside = {"_nrt": False, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}  # as laws are, above
+    return _njit(function, forceinline=True, **inside) if COMPILED else function
 
 
 def _compiled_with_arrays(function: Callable[..., Any]) -> Callable[..., Any]:
