@@ -463,7 +463,8 @@ class Search(Generic[M, P, F]):
     def with_more(self, begun: Selection[M, P, F], more: Sequence[Effect]
                   ) -> tuple[Search[M, P, F], Selection[M, P, F]]:
         """A search that has ended, gone on with more effects. These are tried on the model that it began with and on
-        the one that it ended with, and in the place of what it found; what was tried before is not tried again."""
+        the one that it ended with, and in the place of what it found; what was tried before is not tried again. Where
+        none is taken, or may be beside refinements, the result is that of before."""
         wider = replace(self, effects=[*self.effects, *more], share=1.0, _promising=set(), _rivals=dict(begun.rivals))
         before, now = begun.before, begun.now
         first = wider.round(before, more, beside=begun.first)
@@ -473,7 +474,12 @@ class Search(Generic[M, P, F]):
         for name in names_of(now)[self.present:] if wider._promising else ():
             now = wider._reconsider(before, now, name)
         wider._promising |= self._promising
-        known = wider.round(now, more, beside=begun.last) if begun.last.on is now else None
+        known = None
+        if now is begun.now:
+            known = wider.round(now, more, beside=begun.last if begun.last.on is now else UNTRIED)
+            if not any(one.effect in more and (wider.is_accepted(now, one) or wider.may_imitate(now, one))
+                       for one in known.fits):
+                return wider, replace(begun, first=first, last=known)
         return wider, wider.go_on(replace(begun, now=now, first=first), known)
 
     def _refined(self, now: M) -> M:

@@ -337,3 +337,13 @@ def test_a_search_that_goes_on_with_one_more_effect_finds_the_same_and_fits_noth
     assert (found.gains, found.rivals) == (whole.gains, whole.rivals)
     assert {one.effect.name for one in found.first.fits} == {one.effect.name for one in whole.first.fits}
     assert [name for name, before in wider.likelihood.fitted[known:] if not before] == [later]
+
+
+def test_what_goes_on_with_one_more_effect_that_is_not_taken_is_as_it_was_and_tries_no_other() -> None:
+    few = replace(search(), likelihood=MadeUp(stops=lambda what, share: share < 1))
+    few.effects = [one for one in few.effects if one.name != "time_offset"]
+    begun = few.run(Made())
+    known = len(few.likelihood.fitted)
+    _, found = few.with_more(begun, [EFFECTS["time_offset"]])
+    assert (found.now, found.gains) == (begun.now, begun.gains) and len(found.now.effects) == 1
+    assert not {name for name, _ in few.likelihood.fitted[known:]} & {"tire_damping", "sensor_offset"}
