@@ -53,11 +53,13 @@ numbers of the state may cancel for a while (a judgement)."""
 @dataclass(frozen=True, eq=False)
 class Beginning:
     """A state (2 n + k,) in which a run begins, as ``Passage.begins``, and how what its signals record changes with it
-    (m, 2 n + k); the ``usual`` size of each number of the state, 0 of those that are known."""
+    (m, 2 n + k), in so many samples (``count``); the ``usual`` size of each number of the state, 0 of those that are
+    known."""
 
     state: Array
     columns: Array
     usual: Array
+    count: int
 
 
 def begins_unknown(car: Car, run: Run) -> bool:
@@ -78,10 +80,11 @@ def beginning(car: Car, passage: Passage, run: Run, recorded: Recorded, near: Be
     that of a motion by what the signals ever were (``_WIDE``), that of a memory is one unit of its law, which for
     friction is that it slides.
     """
-    if car.structure.held:
-        run, passage = _one_cycle(car, passage, run)
-    weighed = _WeighedRecord(run, recorded)
     count = 2 * len(car.structure.mass) + car.memories
+    lasts = _shown_in(car, passage, run, count) if near is None else near.count
+    if lasts < run.count:
+        run, passage = run.part(slice(lasts)), passage.cut(lasts)
+    weighed = _WeighedRecord(run, recorded)
     passage.under_wheels(passage.driven(car.structure))  # asked for once, for all states
     # What hangs on a car has a state as soon as it weighs something.
     # One cycle is another number of samples of another road.
@@ -98,9 +101,10 @@ def _linear_beginning(car: Car, passage: Passage, weighed: _WeighedRecord, count
     """The beginning (``count``) of the car without its laws, whose record is linear in it."""
     wanted, plain, moves = weighed.measured, car.linear, 2 * len(car.structure.mass)
     columns, state, usual = np.zeros((len(wanted), count)), np.zeros(count), np.ones(count)
+    samples = weighed.run.count
     if car.structure.held or not len(wanted):
         usual[:moves] = 0.0  # the bench moves it
-        return Beginning(state, columns, usual)
+        return Beginning(state, columns, usual, samples)
     still = weighed.whole(plain, passage)
     # Small, as records are clipped at what no sensor reads: 1 m is that of what is let go at 160 Hz.
     small = [weighed.whole(plain, passage.begun_with(one)) - still for one in _SMALL_STATE * np.eye(moves)]
@@ -110,7 +114,7 @@ def _linear_beginning(car: Car, passage: Passage, weighed: _WeighedRecord, count
     left = wanted - weighed.counted(still)
     for _ in range(_PRIOR_ROUNDS):  # the prior weighs as much as the noise that is left allows
         state = state + _towards(columns, left - columns @ state, usual, state)
-    return Beginning(state, columns, usual)
+    return Beginning(state, columns, usual, samples)
 
 
 def _bent_beginning(car: Car, passage: Passage, weighed: _WeighedRecord, start: Beginning, is_near: bool) -> Beginning:
@@ -129,7 +133,7 @@ def _bent_beginning(car: Car, passage: Passage, weighed: _WeighedRecord, start: 
         way = _towards(columns, weighed.measured - here, usual, state)
         least, gained = weighed.misfit(here, state * per_usual), 0.0
         if weighed.misfit(here + columns @ way, (state + way) * per_usual) > least - _SMALL_GAIN:
-            return Beginning(state + way, columns, usual)
+            return replace(start, state=state + way, columns=columns)
         for share in (1.0, 0.5, 0.25, 0.1, 0.02) if fresh else (1.0,):
             step = share * way
             there = weighed.of(car, passage.begun_with(state + step))
@@ -140,18 +144,25 @@ def _bent_beginning(car: Car, passage: Passage, weighed: _WeighedRecord, start: 
             usually = step * per_usual**2
             columns += np.outer(there - here - columns @ step, usually / (usually @ step))
             state, here = state + step, there
-        if fresh and gained < _SMALL_GAIN:
+        if (fresh or is_near) and gained < _SMALL_GAIN:
             break
         own = gained > 0
-    return Beginning(state, columns, usual)
+    return replace(start, state=state, columns=columns)
 
 
-def _one_cycle(car: Car, passage: Passage, run: Run) -> tuple[Run, Passage]:
-    """The beginning of a run of a part: after it has moved through its stroke and back, what it remembered is gone."""
-    places = passage.under_wheels(car.structure)[0][: run.count * passage.steps, 0]
-    gone = np.searchsorted(np.cumsum(np.abs(np.diff(places))), 2 * np.ptp(places)) // passage.steps
-    count = max(int(gone), 2 * run.first) + 2
-    return run.part(slice(count)), passage.cut(count)
+def _shown_in(car: Car, passage: Passage, run: Run, numbers: int) -> int:
+    """How many samples of a run tell how it began, by so many numbers of a state. A part has forgotten that when it has
+    moved through its stroke and back. The squares of what a car that was driven still shows of it fade with twice its
+    slowest decay: the rest, of one cut in halves, would gain less than what the last step may."""
+    if car.structure.held:
+        places = passage.under_wheels(car.structure)[0][: run.count * passage.steps, 0]
+        gone = np.searchsorted(np.cumsum(np.abs(np.diff(places))), 2 * np.ptp(places)) // passage.steps
+        return min(run.count, max(int(gone), 2 * run.first) + 2)
+    if run.past is not Past.DRIVEN or run.facts.pass_band_hz is not None:
+        return run.count
+    lasts_s = run.skip_s + np.log(numbers / _SMALL_GAIN) / (2 * max(car.structure.slowest_decay_per_s, ROUNDING))
+    halves = int(max(np.log2(run.count / (lasts_s * run.rate_hz)), 0.0))
+    return int(np.ceil(run.count / 2**halves))
 
 
 def _towards(columns: Array, left: Array, usual: Array, state: Array) -> Array:
@@ -337,7 +348,8 @@ class SimulatedRuns:
     @property
     def work(self) -> int:
         """Steps that were simulated so far, with those that would have taken the time of all else: a third of the
-        samples of all signals, and 35,000 for each prediction (measured: 85 ns a step, 3 ms a prediction)."""
+        samples of all signals, and 35,000 for each prediction, not for what finds its beginnings (measured: 85 ns a
+        step, 3 ms a prediction)."""
         return sum(self._work)
 
     def predict(self, car: Car, distance_error_m: Sequence[Array] | None = None, rough: bool = False,
@@ -356,10 +368,9 @@ class SimulatedRuns:
             steps = car.bends_laws or car.structure.held
             for step_s, forces in {(one.step_s, one.forces) for one in passages if steps}:
                 stepper_of(car, step_s, forces)  # made once, before both threads ask for it
-        self._work.append(35_000 + sum(len(one.way.distance_m) + run.count * (1 + len(run.signals)) // 3
-                                       for one, run in zip(passages, self.runs, strict=True)))
+        self._work.append(35_000)
         each: Iterable[Array] = (self._steppers.map if car.bends_laws and len(passages) > 1 else map)(
-            partial(_recorded, car), passages, self.runs)
+            partial(self._recorded, car), passages, self.runs)
         return [run.in_band(one) for run, one in zip(self.runs, each, strict=True)]
 
     def linear_slopes(self, car_with: Callable[[Array], Car], here: Array,
@@ -397,7 +408,7 @@ class SimulatedRuns:
     def beginnings(self, car: Car, distance_error_m: Sequence[Array] | None = None) -> list[Beginning | None]:
         """How the runs begin with this car whose initial state nobody knows, simulated roughly; None of the others."""
         with np.errstate(over="ignore", invalid="ignore"):
-            return [passage.beginning_of(car.record_key, partial(beginning, car, passage, run, _recorded))
+            return [passage.beginning_of(car.record_key, partial(beginning, car, passage, run, self._recorded))
                     if begins_unknown(car, run) else None
                     for run, passage in zip(self.runs, self._unbegun(car, distance_error_m, rough=True), strict=True)]
 
@@ -408,13 +419,13 @@ class SimulatedRuns:
         if not any(begins_unknown(car, run) for run in self.runs):
             return passages
         if near is not None and not near and all(run.past is Past.DRIVEN for run in self.runs):
-            return [passage.begun_with(beginning(car, passage, run, _recorded, is_bent=False).state)
+            return [passage.begun_with(beginning(car, passage, run, self._recorded, is_bent=False).state)
                     if begins_unknown(car, run) else passage for run, passage in zip(self.runs, passages, strict=True)]
         known = near or self.beginnings(car, distance_error_m)
         alike = [near is None and one is passage for one, passage in zip(
             self._unbegun(car, distance_error_m, rough=True), passages, strict=True)]
         return [passage if not begins_unknown(car, run) else passage.begun_with((
-            one if one is not None and same else beginning(car, passage, run, _recorded, one)).state)
+            one if one is not None and same else beginning(car, passage, run, self._recorded, one)).state)
                 for run, passage, one, same in zip(self.runs, passages, known, alike, strict=True)]
 
     def _unbegun(self, car: Car, distance_error_m: Sequence[Array] | None, rough: bool,
@@ -437,12 +448,12 @@ class SimulatedRuns:
             found.append(passage)
         return found
 
-
-def _recorded(car: Car, passage: Passage, run: Run) -> Array:
-    main = run.facts.main
-    with np.errstate(over="ignore", invalid="ignore"):
-        found = recorded_signals(car, passage, run.signals, main, zero_is_known(main, run.track))
-    return np.clip(np.nan_to_num(found, nan=MOST_MPS2), -MOST_MPS2, MOST_MPS2)
+    def _recorded(self, car: Car, passage: Passage, run: Run) -> Array:
+        main = run.facts.main
+        self._work.append(len(passage.way.distance_m) + run.count * (1 + len(run.signals)) // 3)
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = recorded_signals(car, passage, run.signals, main, zero_is_known(main, run.track))
+        return np.clip(np.nan_to_num(found, nan=MOST_MPS2), -MOST_MPS2, MOST_MPS2)
 
 
 def _slopes(car: Car, passage: Passage, run: Run, around: Sequence[tuple[Car, Car]]) -> Array:

@@ -133,10 +133,10 @@ def test_a_memory_of_which_its_record_shows_nothing_stays_at_rest() -> None:
     assert (near - before)[50:] == pytest.approx((alone - before)[50:], abs=1e-3 * np.ptp(alone - before))
 
 
-def shaken_before(measures: str, car: Car) -> Run:
+def shaken_before(measures: str, car: Car, count: int = 1200) -> Run:
     """The end of a longer record of what is shaken."""
-    shaken = Excitation(RATE_HZ, 0.002 * np.random.default_rng(3).standard_normal(1200))
-    whole = Run("whole", RATE_HZ, *np.zeros((3, 1200)), shaken, facts=RecordFacts(main=SIGNALS[measures]))
+    shaken = Excitation(RATE_HZ, 0.002 * np.random.default_rng(3).standard_normal(count))
+    whole = Run("whole", RATE_HZ, *np.zeros((3, count)), shaken, facts=RecordFacts(main=SIGNALS[measures]))
     (motion,) = SimulatedRuns([whole]).predict(car)
     later = replace(whole.part(slice(400, None)), track=shaken.begun(4.0))
     return replace(later, measured_mps2=motion[400:] - motion[400:].mean())
@@ -156,6 +156,27 @@ def test_a_driven_record_begins_in_the_ringing_of_before(measures: str) -> None:
         (found,) = SimulatedRuns([later]).predict(car)
         off = later.residual(found)[later.first:]
         assert off.std() < 2e-3 * later.measured_mps2.std()
+
+
+def test_the_part_of_a_record_that_shows_it_says_how_it_began() -> None:
+    """By what the least squares of its free vibrations over the whole would gain more. What finds it counts as work."""
+    car = compose(ringing(0.7))
+    later = shaken_before("displacement", car, 3000)
+    noise = 0.2 * later.measured_mps2.std() * np.random.default_rng(5).standard_normal(later.count)
+    runs = SimulatedRuns([replace(later, measured_mps2=later.measured_mps2 + noise)])
+    (found,) = runs.predict(car)
+    (begins,) = runs.beginnings(car)
+    rests = SimulatedRuns([replace(runs.runs[0], skip_s=0.0)])
+    rests.predict(car)
+    assert begins is not None and begins.count < later.count / 3 and rests.work < runs.work
+    decay, time_s = 0.7 / 2 / M, np.arange(later.first, later.count) / RATE_HZ
+    turns = np.sqrt(K / M - decay**2) * time_s
+    columns = np.stack([np.exp(-decay * time_s) * np.cos(turns), np.exp(-decay * time_s) * np.sin(turns),
+                        np.ones(len(time_s))], axis=1)
+    left = runs.runs[0].residual(found)[later.first:]
+    left -= left.mean()  # its zero is not known
+    more = left - columns @ np.linalg.lstsq(columns, left)[0]
+    assert 0 <= len(left) * np.log((left @ left) / (more @ more)) < 0.1
 
 
 def test_to_rank_cars_a_driven_record_begins_as_without_their_laws(monkeypatch: pytest.MonkeyPatch) -> None:
