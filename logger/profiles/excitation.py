@@ -167,7 +167,9 @@ class Excitation:
         acting = self.force_n
         for one in actuators:
             acting = np.stack([one(self.rate_hz, force_n) for force_n in acting.T], axis=1)
-        return replace(self, force_n=acting)
+        found = replace(self, force_n=acting)
+        vars(found).update(_denoised_m=self._denoised_m, _curves=self._curves, _integrals=self._integrals)  # the same
+        return found
 
     def forces_n(self, time_s: Array) -> Array:
         """The forces (M, f) at some times since the first sample of the record [s] [N]."""

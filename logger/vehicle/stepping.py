@@ -137,16 +137,18 @@ def _without_laws(structure: Structure, step_s: float, with_ends: bool) -> tuple
     u = b.shape[1]
     transition, at_start, at_end = straight_step(a, np.hstack([b, force_input(structure)]), step_s)
     inputs = [at_start[:, :u] + at_end[:, :u], at_end[:, :u] - at_start[:, :u]]
-    seen = np.vstack([np.kron(order, rows) for rows in (structure.travel, structure.wheels) for order in np.eye(2)])
+    seen = np.zeros((4 * w, 2 * n))  # places and rates of suspensions, then of wheels
+    seen[:w, :n] = seen[w:2 * w, n:] = structure.travel
+    seen[2 * w:3 * w, :n] = seen[3 * w:, n:] = structure.wheels
     through = np.zeros((len(seen), u))
     if structure.on_base:  # from which its place is counted
         through[2 * w, BASE_INPUTS.index("height")] = through[3 * w, BASE_INPUTS.index("velocity")] = 1.0
     if with_ends:
-        seen = np.vstack([seen, np.kron(np.eye(2)[1], structure.travel + structure.wheels)])
+        seen = np.vstack([seen, np.hstack([np.zeros((w, n)), structure.travel + structure.wheels])])
         through = np.vstack([through, through[w:2 * w] + through[3 * w:]])
     rest = (-len(seen) - 2 * n) % LANES
     state_and_seen = np.vstack([np.eye(2 * n), seen, np.zeros((rest, 2 * n))])
-    inputs_seen = np.pad(through, ((2 * n, rest), (0, 0)))
+    inputs_seen = np.vstack([np.zeros((2 * n, u)), through, np.zeros((rest, u))])
     known = np.ascontiguousarray((state_and_seen @ np.hstack([transition, at_start[:, u:], *inputs])).T)
     known[-2 * u:] += np.tile(inputs_seen.T, (2, 1))  # at the end of a step: the mean over it, and the rise
     return (state_and_seen, inputs_seen, known, state_and_seen @ at_end[:, u:],

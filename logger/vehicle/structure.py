@@ -56,8 +56,9 @@ def straight_step(a: Array, b: Array, step_s: float) -> tuple[Array, Array, Arra
     For an input that is held over the step both ends are the same: F and G0 + G1.
     """
     n, m = b.shape
-    bottom = np.block([[np.zeros((m, n + m)), np.eye(m) / step_s], [np.zeros((m, n + 2 * m))]])
-    whole = matrix_exponential(np.vstack([np.block([a, b, np.zeros((n, m))]), bottom]) * step_s)
+    rates = np.zeros((n + 2 * m, n + 2 * m))
+    rates[:n, :n], rates[:n, n:n + m], rates[n:n + m, n + m:] = a, b, np.eye(m) / step_s
+    whole = matrix_exponential(rates * step_s)
     end = whole[:n, n + m:]
     return whole[:n, :n], whole[:n, n:n + m] - end, end
 

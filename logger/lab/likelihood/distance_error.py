@@ -312,13 +312,17 @@ class RigRecordError(RecordError):
     def log_determinant(self, size: ErrorSize) -> float:
         return -2 * float(np.log(self._deviations).sum())
 
+    @cached_property
+    def _from_middle_s(self) -> Array:
+        return np.asarray(self.basis.toarray()[0])
+
     def distance_error_m(self, k: Array) -> Array:
         return np.zeros(self.run.count)
 
     def with_recorder_error(self, prediction: Array, k: Array) -> Array:
         """As of ``RecordError``; a clock moves by so little that two terms of Taylor's series are enough."""
         if k[: self.places].any():
-            late_s, rate_hz = k[0] * self.basis.toarray()[0], self.run.rate_hz
+            late_s, rate_hz = k[0] * self._from_middle_s, self.run.rate_hz
             signals = prediction.reshape(-1, self.run.count)
             rises = np.stack([derivative(one, rate_hz) for one in signals])
             bends = np.stack([derivative(one, rate_hz) for one in rises])
@@ -407,7 +411,12 @@ def derivative(samples: Array, rate_hz: float) -> Array:
     48 (B. Fornberg, Mathematics of Computation 51, 1988). The difference of two neighbours would give half of it at
     30 Hz."""
     taps = _difference_taps(24)
-    past_ends = np.pad(samples, len(taps) // 2, mode="reflect", reflect_type="odd")
+    half = len(taps) // 2
+    if len(samples) > half:
+        past_ends = np.concatenate([2 * samples[0] - samples[half:0:-1], samples,
+                                    2 * samples[-1] - samples[-2 : -half - 2 : -1]])
+    else:
+        past_ends = np.pad(samples, half, mode="reflect", reflect_type="odd")  # again and again
     return np.asarray(np.convolve(past_ends, taps, mode="valid") * rate_hz)
 
 
