@@ -23,7 +23,7 @@ from logger.lab.residual_tests import run_residual_tests
 from logger.lab.residual_tests.tests import ResidualEvidence, ResidualTestResult, ResidualTestResults
 from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown
 from logger.lab.residuals.unexplained import Removed, removed_from
-from logger.lab.selection.holdout import AS_FILED, REFITTED, ErrorStep, cross_validate
+from logger.lab.selection.holdout import REFITTED, ErrorStep, as_filed, cross_validate
 from logger.lab.selection.starts import fitted_from_starts
 from logger.runs import normalised_rms_error, signal_errors
 from logger.simulation.virtual_drive import SimulatedRuns
@@ -129,7 +129,8 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
                   for name, value in before.values.items() if value}
     return LabComparison(vehicle.name, tuple(effects), plain, refitted, moves,
                          tuple(posterior.prior.beyond_tolerance(state.logs, errors.covariance)),
-                         (ErrorStep(AS_FILED, plain.error), ErrorStep(REFITTED, cross_validate(linear).error)),
+                         (as_filed(plain.error, posterior.tolerance),
+                          ErrorStep(REFITTED, cross_validate(linear).error)),
                          floor_error(posterior, sensor_noise_with_rounding(posterior, state)),
                          removed, _tests(refitted, removed, plain))
 

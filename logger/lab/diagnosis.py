@@ -41,7 +41,7 @@ from logger.lab.selection.candidate_fit import CandidateFit
 from logger.lab.selection.detectability import Undetectable, effect_as_moved, undetectable_effects
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION, INDISTINGUISHABLE
 from logger.lab.selection.filter_without_delay import below_filter_without_delay
-from logger.lab.selection.holdout import AS_FILED, REFITTED, ErrorStep, HoldOut, cross_validate
+from logger.lab.selection.holdout import REFITTED, ErrorStep, HoldOut, as_filed, cross_validate
 from logger.lab.selection.screening import Baseline, Screened, effects_without, misalignment
 from logger.lab.selection.starts import UnknownNumbers, needs_starts
 from logger.lab.selection.stepwise import F, M, MeasuredRoad, P, Search, SearchEffort, Selection, is_outside_data
@@ -359,7 +359,7 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
         left_open=left_open,
         ends=starts.ends, not_searched=tuple(starts.not_tried),
         as_moved=effect_as_moved(after, [one for one in tried if one.name not in state.names], left_open),
-        steps=_steps(selection, posterior.error(nominal)),
+        steps=_steps(selection, as_filed(posterior.error(nominal), posterior.tolerance)),
         effects=errors.effects,
         undetectable=hidden, shape=shape if excess > UNEXPLAINED else None, coloured=colour is not None,
         removed=removed, band=compared_band(fine.runs.runs), signals=signal_errors_of(fine, baseline, state),
@@ -462,9 +462,9 @@ def _gains_more_than_chance(search: Search, before: Baseline, after: LinearModel
     return search.likelihood.chance(one, rest.score - after.score, before, len(search.effects)) < FALSE_ALARM
 
 
-def _steps(selection: Selection, nominal_error: float) -> tuple[ErrorStep, ...]:
+def _steps(selection: Selection, nominal: ErrorStep) -> tuple[ErrorStep, ...]:
     """The models of the search in order."""
-    steps = [ErrorStep(AS_FILED, nominal_error), ErrorStep(REFITTED, selection.before.hold_out.error)]
+    steps = [nominal, ErrorStep(REFITTED, selection.before.hold_out.error)]
     steps += [ErrorStep(f"with {name}", hold_out.error) for name, hold_out in selection.steps]
     last = selection.steps[-1][1] if selection.steps else selection.before.hold_out
     if selection.now.hold_out is not last:

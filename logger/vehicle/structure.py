@@ -324,7 +324,8 @@ def force_row(structure: Structure, parts: Sequence[str]) -> Array:
                 **{part: structure.wheels[corner_of(structure, part)] for part in parts if part.endswith("wheel")}}
         # Beside a wheel, the body's end of its suspension is meant; else its centre of gravity.
         rows["body"] = (structure.travel + structure.wheels)[wheels[0]] if wheels else structure.body[:, 0]
-        first, second = (rows[part] for part in (*parts, GROUND)[:2])
+        # The body is above its wheels, in whichever order the two are named that are pushed apart.
+        first, second = (rows[part] for part in sorted((*parts, GROUND)[:2], key=lambda part: part != "body"))
     except KeyError as error:
         raise ValueError(f"this vehicle has no {str(error.args[0]).replace('_', ' ')}") from None
     return np.asarray(first - second)

@@ -47,6 +47,15 @@ def test_spring_and_damper_are_found_from_a_record_alone(tmp_path: Path) -> None
     assert again["parameters"] == pytest.approx(answer["parameters"])
 
 
+def test_no_error_of_the_file_is_said_where_it_gives_no_numbers(tmp_path: Path) -> None:
+    run, vehicle, fitted = decay(tmp_path / "run"), tmp_path / "vehicle.yaml", tmp_path / "fitted.yaml"
+    vehicle.write_text(VEHICLE.replace("350", "unknown").replace(" 4\n", " unknown\n"))
+    called("identify", "--vehicle", vehicle, "--out", fitted, run)
+    guessed, found = (called("compare", "--vehicle", one, run).stdout for one in (vehicle, fitted))
+    assert "with guesses for what the vehicle's file leaves unknown" in " ".join(guessed.split())
+    assert "with the vehicle's file unchanged" in " ".join(found.split())
+
+
 def test_what_was_held_before_is_cut_off_and_said(tmp_path: Path) -> None:
     decay(tmp_path / "run"), decay(tmp_path / "held", held=150)
     asked = "--vehicle", tmp_path / "vehicle.yaml", "--free", "stiffness_n_per_m,damping_n_s_per_m", "--json"

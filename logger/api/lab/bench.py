@@ -10,7 +10,6 @@ from contextlib import AbstractContextManager
 from copy import copy
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -38,7 +37,7 @@ from logger.store.formats.effect_file import check_on, effect_named, own_effect
 from logger.store.formats.vehicle_file import CarModel, ModelStep
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, Effect, ForceEffect, SensorEffect, Sought, VehicleEffect, chosen
-from logger.vehicle.uncertain import Known, Scales, sized
+from logger.vehicle.uncertain import Scales, sized
 from logger.vehicle.vehicle import OWN_NAMES
 
 _SLOW = "expect ten minutes or more for each minute driven"
@@ -230,11 +229,11 @@ def planned_bench(word: str, model: CarModel, drives: Sequence[Run], effect_file
     return found
 
 
-def tolerance_of(said: float | str | None, known: Mapping[str, Known] = MappingProxyType({})) -> Tolerance:
-    """How well a car's numbers are known: as its file says (``known``), and the others to what the user said, a share
+def tolerance_of(said: float | str | None, model: CarModel) -> Tolerance:
+    """How well a car's numbers are known: as its file says, and the others to what the user said, a share
     of masses, springs and dampers either way, or that they are unknown; None: the usual one. BadInput for a share that
     no car's numbers have."""
-    by_file = Tolerance.of(known)
+    by_file = replace(Tolerance.of(model.known), guessed=model.is_guessed)
     if said is None:
         return by_file
     if said == UNKNOWN:
@@ -395,7 +394,7 @@ def bench_with(question: LabQuestion, searches: str | None = None, thin: bool = 
     given: Any = question
     drives = lab_drives(given.runs, question.warn)
     model = with_initial_values(model_of(given.vehicle), drives)
-    off = tolerance_of(question.tolerance, model.known)
+    off = tolerance_of(question.tolerance, model)
     runs = checked_runs(drives, thin, model.vehicle)
     return bench_of(word_of(given.vehicle, model), model, runs, list(map(str, getattr(question, "effect_files", ()))),
                     off, searches, question.warn, question.low_pass_hz, question.anyway)

@@ -354,7 +354,7 @@ def comparison_blocks(found: LabComparison) -> Iterator[Block]:
 
 def _tiles(found: LabComparison) -> doc.Html:
     residuals = found.plain.residuals
-    return doc.tiles([("NRMSE, file unchanged", f"{found.plain.error:.3f}", ""),
+    return doc.tiles([("NRMSE before any fit", f"{found.plain.error:.3f}", ""),
                       ("NRMSE refitted", f"{found.steps[-1].error:.3f}", JUDGED_ON),
                       *lab_words.drift_tile(found.removed),
                       ("Residual tests that find something", f"{len(found.tests_found)}",

@@ -255,7 +255,7 @@ def _longest_part(drive: drive_file.Drive) -> drive_file.Drive:
 
 def _diagnosed(model: Model, records: Sequence[Record], question: DiagnoseQuestion) -> UnknownRoadDiagnosis:
     """Which effects the model lacks. BadInput for drives that are plainly over two roads."""
-    off, given = tolerance_of(question.tolerance, model.known), model.given or model.vehicle
+    off, given = tolerance_of(question.tolerance, model), model.given or model.vehicle
     word, notify = word_of(question.vehicle, model), question.progress
     for one in model.effects:
         if one.effect.obstacle(model.vehicle, two_tracks=False) is not None:
@@ -323,7 +323,7 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
     errors, *rises = lab_words.error_words(found.steps, found.noise_floor_error)
     lines += [f"{errors} {_explained_power(found)}", *rises]
     lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
-                           "{} with the vehicle's file unchanged, {} finally, noise floor about {}")
+                           f"{{}} with {found.steps[0].words}, {{}} finally, noise floor about {{}}")
     lines += _faint(found)
     dropped = [name for name in (step.words.removeprefix("with ") for step in found.steps)
                if name in found.catalogue and name not in found.verdict]
@@ -528,7 +528,7 @@ def diagnosis_blocks(found: LabDiagnosis, most: int | None) -> Iterator[Block]:
     yield Section(_ONE_BY_ONE, [
         Bars("NRMSE with each effect", "NRMSE", tuple(
             (one.effect.name, one.error) for one in found.candidates[:_MOST_BARS]),
-            (found.baseline_error, "file unchanged")),
+            (found.baseline_error, "before any fit")),
         *_table(found, most)])
     yield Section("What these runs cannot tell", [Bullets(untested(found))])
     yield Detail("Sources", [Bullets([f"{one.effect.name}: {one.effect.source}" for one in found.missing])])
@@ -563,7 +563,7 @@ def _tiles(found: LabDiagnosis) -> doc.Html:
     unknown = "something unknown" if not missing else f"{count}, and more"
     return doc.tiles([
         ("Missing", unknown if found.exceeds_noise or (found.unexplained and not missing) else count, ""),
-        ("NRMSE, file unchanged", f"{found.baseline_error:.3f}", ""),
+        ("NRMSE before any fit", f"{found.baseline_error:.3f}", ""),
         ("NRMSE with the missing effects" if missing else "NRMSE refitted", f"{found.steps[-1].error:.3f}", JUDGED_ON),
         *lab_words.drift_tile(found.removed),
         ("Noise floor", f"{found.noise_floor_error:.3f}", "NRMSE"),

@@ -327,6 +327,6 @@ def _tiles(summary: dict[str, object]) -> Html:
         value = summary[key]
         return f"{value:.3f}" if isinstance(value, float) else "not known"
 
-    return tiles([("NRMSE, file unchanged", error("error_before"), ""),
+    return tiles([("NRMSE before any fit", error("error_before"), ""),
                   ("Final NRMSE", error("error_after_unseen"), JUDGED_ON),
                   ("Noise floor", error("noise_floor_error"), "NRMSE")])

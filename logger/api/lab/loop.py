@@ -366,7 +366,7 @@ def _story_blocks(story: Story) -> Iterator[Block]:
     at_last = [last] if len(story.diagnoses) > 1 and not last.missing else []
     before = story.diagnoses[:len(story.diagnoses) - len(at_last)]
     yield doc.tiles([
-        ("NRMSE, file unchanged", f"{steps(story)[0][1]:.3f}", ""),
+        ("NRMSE before any fit", f"{steps(story)[0][1]:.3f}", ""),
         ("NRMSE finally", f"{steps(story)[-1][1]:.3f}", "refitted"),
         ("Noise floor", f"{story.floor:.3f}", "NRMSE"),
         ("Effects added", f"{len(story.added)}", ""),
@@ -470,7 +470,7 @@ def field_page(title: str, about: Sequence[str], ways: Curves, story: Story, bef
         doc.tiles([
             ("Bias of the IRI, initially", f"{first['bias']:+.1%}", f"R2 {first['r2']:.2f}"),
             ("finally", f"{last['bias']:+.1%}", f"R2 {last['r2']:.2f}"),
-            ("NRMSE, initially", f"{steps(story)[0][1]:.3f}", "file unchanged"),
+            ("NRMSE, initially", f"{steps(story)[0][1]:.3f}", "before any fit"),
             ("finally", f"{steps(story)[-1][1]:.3f}", "refitted"),
         ]),
         *about,

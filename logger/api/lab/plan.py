@@ -80,7 +80,7 @@ class Plan(CommandResult):
 @function(PlanQuestion)
 def plan(question: PlanQuestion) -> Plan:
     model, bench = model_of(question.vehicle), None
-    tolerance = tolerance_of(question.tolerance, model.known)
+    tolerance = tolerance_of(question.tolerance, model)
     road = None if question.profile is None else drive_file.track_of(
         question.profile if isinstance(question.profile, profile_file.Wheelpaths) else read_profile(question.profile))
     if each(question.runs):

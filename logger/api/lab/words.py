@@ -13,7 +13,7 @@ from logger.lab.likelihood.record_band import ComparedBand
 from logger.lab.likelihood.whittle import LOWEST_HZ
 from logger.lab.residuals.breakdown import Part
 from logger.lab.residuals.unexplained import EXPONENTIAL, OFFSET, RAMP, STEP, WANDER, Drift, Removed, Shape, SpatialLine
-from logger.lab.selection.holdout import AS_FILED, JUDGED_ON, REFITTED, ErrorStep, fit_percent, rising
+from logger.lab.selection.holdout import AS_FILED, AS_GUESSED, JUDGED_ON, REFITTED, ErrorStep, fit_percent, rising
 from logger.printable import percent
 from logger.report.blocks import SHOWN_ROWS, Block, Detail, Hint, Table
 from logger.report.charts import chart
@@ -156,7 +156,7 @@ def _alike(one: Drift, other: Drift) -> bool:
     return one.form == other.form and all(a is None or b is None or abs(a - b) <= _ALIKE * abs(b) for a, b in pairs)
 
 
-_ERROR_WORDS = {AS_FILED: "with the vehicle's file unchanged", REFITTED: "with its parameters refitted"}
+_ERROR_WORDS = {one: f"with {one}" for one in (AS_FILED, AS_GUESSED, REFITTED)}
 
 
 def error_words(steps: Sequence[ErrorStep], floor: float, of: str = f"on {JUDGED_ON}") -> list[str]:

@@ -34,6 +34,7 @@ class Tolerance:
     clock        rate of a rig's recorder over that of what drives it, less 1: quartz crystals of +- 50 ppm each
     band         in which numbers may well be, in these deviations: 20 % either way have 12.5 %
     by_name      of numbers of which the vehicle's file says how well they are known
+    guessed      whether it gives no value for some of them, in whose place stands where a search begins
     """
 
     numbers: float = 0.125
@@ -44,6 +45,7 @@ class Tolerance:
     clock: float = 4e-5
     band: float = 1.6
     by_name: Mapping[str, float] = field(default_factory=dict)
+    guessed: bool = False
 
     @classmethod
     def of(cls, known: Mapping[str, Known]) -> "Tolerance":

@@ -32,7 +32,7 @@ from logger.lab.likelihood.standard_errors import standard_errors
 from logger.lab.residuals.unexplained import Removed, removed_from
 from logger.lab.selection.candidate_fit import chance_of
 from logger.lab.selection.evidence import FALSE_ALARM
-from logger.lab.selection.holdout import AS_FILED, REFITTED, ErrorStep, cross_validate, rising
+from logger.lab.selection.holdout import AS_FILED, REFITTED, ErrorStep, as_filed, cross_validate, rising
 from logger.lab.selection.starts import fitted_from_starts
 from logger.runs import are_on_rig
 from logger.vehicle.effect import Chosen, chosen
@@ -85,6 +85,7 @@ class AddedEffects:
     excess                         share by which the residual is above the noise in the run where it is largest
     signals                        errors of other signals than the sensor's acceleration, without and with the effects
     tolerance                      share by which the car's masses, springs and dampers may well be off
+    filed                          what is said of the vehicle and effects as they were
     """
 
     vehicle: Vehicle
@@ -104,6 +105,7 @@ class AddedEffects:
     held_out_gain: float = 0.0
     band: ComparedBand | None = None
     tolerance: float = Tolerance().share
+    filed: str = AS_FILED
 
     @property
     def gains(self) -> bool:
@@ -113,7 +115,7 @@ class AddedEffects:
     @property
     def steps(self) -> tuple[ErrorStep, ...]:
         """The model as it was, refitted, and with the effects, on one scale."""
-        return (ErrorStep(AS_FILED, self.error_before), ErrorStep(REFITTED, self.error_refitted),
+        return (ErrorStep(self.filed, self.error_before), ErrorStep(REFITTED, self.error_refitted),
                 ErrorStep(f"with {' and '.join(self.names)}", self.error_after))
 
     @property
@@ -182,7 +184,7 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
         excess=excess_over_noise(posterior, state, FALSE_ALARM),
         held_out_gain=unseen_before.deviance - unseen_after.deviance,
         band=compared_band(posterior.runs.runs), signals=signal_errors_of(posterior, before.state, state),
-        tolerance=posterior.tolerance.share)
+        tolerance=posterior.tolerance.share, filed=as_filed(0.0, posterior.tolerance).words)
 
 
 def _fit_with_effects(posterior: Posterior, before: LinearModel, refitted: tuple[Chosen, ...],

@@ -21,12 +21,14 @@ import numpy.typing as npt
 from logger.arrays import Array
 from logger.lab.likelihood.map_fit import own_slopes
 from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.signals import deviance, error_with_rounding_noise
 from logger.runs import Run
 
 JUDGED_ON = "held-out stretches"
 """What the errors of steps and candidates are errors of."""
 AS_FILED, REFITTED = "the vehicle's file unchanged", "its parameters refitted"
+AS_GUESSED = "guesses for what the vehicle's file leaves unknown"
 # A relative difference below it is a rounding: errors are printed to two digits or three.
 AS_PRINTED = 0.005
 _STRETCH_S, _FOLDS = 6.0, 3
@@ -132,6 +134,11 @@ class ErrorStep(NamedTuple):
 
     words: str
     error: float
+
+
+def as_filed(error: float, tolerance: Tolerance) -> ErrorStep:
+    """The model before any fit."""
+    return ErrorStep(AS_GUESSED if tolerance.guessed else AS_FILED, error)
 
 
 def rising(steps: Sequence[ErrorStep]) -> list[str]:

@@ -89,6 +89,11 @@ class CarModel:
     errors: NumberErrors | None = None
     known: Mapping[str, Known] = field(default_factory=dict)
 
+    @property
+    def is_guessed(self) -> bool:
+        """Whether numbers of the vehicle are none of its file's, but where a search for them begins."""
+        return self.given is None and any(one.words == UNKNOWN for one in self.known.values())
+
 
 def read_vehicle(path: Path | str) -> Vehicle:
     """Read the file of a plain vehicle. Raises BadInput (``file:line: expected ...``) for whatever is missing, unknown
