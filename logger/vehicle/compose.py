@@ -293,10 +293,10 @@ def _of_motion(structure: Structure, motion: Motion, inputs: Array, outputs: Seq
 
 def in_blocks(structure: Structure, passage: Passage, observe: Array) -> Array:
     """Outputs (M, p) ``observe`` (p, 2 n) of the state at the fine instants, of a linear car."""
-    driving = passage.means_and_rises(structure)
+    driving, moves = passage.driving(structure)
     transition, gain = linear_step(structure, passage.step_s)
     if structure.on_base:  # that of a rig which a force drives is at rest
-        moves = driving.any(axis=0) & gain.any(axis=0)
+        moves = moves & gain.any(axis=0)
         driving, gain = driving[:, moves], gain[:, moves]
     start = begun(structure.at_rest(passage.under_wheels(structure)[0][0]), passage.begins)
     return driven_outputs(transition, gain, observe, driving, start)

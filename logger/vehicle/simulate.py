@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from logger.arrays import Array, Complex
+from logger.arrays import Array, Bools, Complex
 from logger.bounds import EVEN_SAMPLES
 from logger.dsp.filters import kaiser_half_length, low_pass_taps
 from logger.dsp.resample import PASS_OF_RATE
@@ -129,6 +129,7 @@ class Passage:
         self._bodies: dict[Hashable, Complex] = {}
         self._beginnings: dict[Hashable, Any] = {}
         self._smooth: list[tuple[Array | None, Array]] = [(None, AT_REST)]
+        self._driving: list[tuple[Array | None, Array, Bools]] = [(None, AT_REST, AT_REST > 0)]
         self._transformed: tuple[Array, Complex, Complex] | None = None
         self._cuts: dict[int, Passage] = {}
 
@@ -192,9 +193,17 @@ class Passage:
     def means_and_rises(self, structure: Structure) -> Array:
         """The means of the inputs in each step, and by how much they rise in half of it (M - 1, 2 u): what steps a
         linear car."""
+        return self.driving(structure)[0]
+
+    def driving(self, structure: Structure) -> tuple[Array, Bools]:
+        """``means_and_rises``, and which of them are not 0 all the time (2 u,)."""
         inputs, mean = self.under_wheels(structure)
-        around = np.concatenate([2 * inputs[:1] - mean[:1], mean, 2 * inputs[-1:] - mean[-1:]])
-        return np.hstack([mean, (around[2:] - around[:-2]) / 4])
+        found = self._driving[0]  # also of the same passage begun in another state
+        if found[0] is not inputs:
+            around = np.concatenate([2 * inputs[:1] - mean[:1], mean, 2 * inputs[-1:] - mean[-1:]])
+            driving = np.hstack([mean, (around[2:] - around[:-2]) / 4])
+            found = self._driving[0] = inputs, driving, np.asarray(driving.any(axis=0))
+        return found[1:]
 
     def smooth_inputs(self, structure: Structure) -> Array:
         """Those at the fine instants, ``smooth``."""
