@@ -12,7 +12,9 @@ MicroStrain; MAVLink).
 """
 
 import re
+from binascii import crc_hqx
 from collections.abc import Callable, Sequence
+from functools import cache
 from itertools import pairwise
 from typing import NamedTuple
 from zlib import crc32
@@ -77,14 +79,19 @@ def _high(data: bytes) -> int:
     return int.from_bytes(data, "big")
 
 
-def _crc(data: bytes, polynomial: int, bits: int) -> int:
-    """Cyclic redundancy check, highest bit first, from zero."""
-    register, top = 0, 1 << (bits - 1)
+@cache
+def _crc24q_of(byte: int) -> int:
+    register = byte << 16
+    for _ in range(8):
+        register = (register << 1) ^ (0x1864CFB if register & 0x800000 else 0)
+    return register
+
+
+def _crc24q(data: bytes) -> int:
+    """RTCM's cyclic redundancy check, highest bit first, from zero."""
+    register = 0
     for byte in data:
-        register ^= byte << (bits - 8)
-        for _ in range(8):
-            register = (register << 1) ^ (polynomial if register & top else 0)
-        register &= (1 << bits) - 1
+        register = ((register & 0xFFFF) << 8) ^ _crc24q_of((register >> 16) ^ byte)
     return register
 
 
@@ -96,9 +103,9 @@ _PROTOCOLS = (
     _Protocol("SkyTraq binary frames", RECEIVER, b"\xa0\xa1", 4, lambda h: 7 + _high(h[2:4]),
               lambda f: f[-2:] == b"\r\n" and _folded(f[4:-3]) == f[-3]),
     _Protocol("RTCM correction messages", RECEIVER, b"\xd3", 3, lambda h: 6 + (_high(h[1:3]) & 0x3FF),
-              lambda f: _crc(f[:-3], 0x864CFB, 24) == _high(f[-3:])),
+              lambda f: _crc24q(f[:-3]) == _high(f[-3:])),
     _Protocol("Septentrio SBF blocks", RECEIVER, b"$@", 8, lambda h: _low(h[6:8]),
-              lambda f: _crc(f[4:], 0x1021, 16) == _low(f[2:4])),
+              lambda f: crc_hqx(f[4:], 0) == _low(f[2:4])),
     _Protocol("NovAtel binary messages", RECEIVER, b"\xaa\x44\x12", 10, lambda h: 4 + h[3] + _low(h[8:10]),
               lambda f: crc32(f[:-4], 0xFFFFFFFF) ^ 0xFFFFFFFF == _low(f[-4:])),
     _Protocol("MediaTek binary packets", RECEIVER, b"\x04\x24", 4, lambda h: _low(h[2:4]),
