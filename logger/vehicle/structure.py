@@ -78,15 +78,15 @@ def recursion(transition: Array, drive: Array, start: Array) -> Array:
     padded[:count] = drive
     states = padded.reshape(stretches, length, n).swapaxes(0, 1).copy()  # (step, stretch, n)
     powers = np.empty((length, n, n))  # of the transition, transposed as rows are states
-    powers[0] = transition.T
+    onward = powers[0] = transition.T
     for step in range(1, length):
-        states[step] += states[step - 1] @ transition.T
-        powers[step] = powers[step - 1] @ transition.T
-    carried = np.empty((stretches, n))
+        states[step] += states[step - 1].dot(onward)
+        powers[step - 1].dot(onward, out=powers[step])
+    carried, over_stretch = np.empty((stretches, n)), powers[-1]
     state = start
-    for stretch in range(stretches):
+    for stretch, end in enumerate(states[-1]):
         carried[stretch] = state
-        state = states[-1, stretch] + state @ powers[-1]
+        state = end + state.dot(over_stretch)
     states += carried @ powers
     return states.swapaxes(0, 1).reshape(-1, n)[:count]
 
@@ -108,7 +108,7 @@ def driven_outputs(transition: Array, gain: Array, observe: Array, inputs: Array
     powers = np.empty((_BLOCK + 1, n, n))
     powers[0] = np.eye(n)
     for steps in range(_BLOCK):
-        powers[steps + 1] = powers[steps] @ transition
+        powers[steps].dot(transition, out=powers[steps + 1])
     driven = powers[:-1] @ gain  # what an input does to the state so many steps after the next one
     to_end = driven[::-1].swapaxes(1, 2)
     seen = (observe @ powers[:-1]).transpose(2, 0, 1)
@@ -194,7 +194,8 @@ class Structure:
     def _state_space(self) -> tuple[Array, Array]:
         n = len(self.mass)
         inverse = np.linalg.inv(self.mass)
-        a = np.block([[np.zeros((n, n)), np.eye(n)], [-inverse @ self.stiffness, -inverse @ self.damping]])
+        a = np.eye(2 * n, k=n)
+        a[n:, :n], a[n:, n:] = -inverse @ self.stiffness, -inverse @ self.damping
         b = np.vstack([np.zeros_like(self.road), inverse @ self.road])
         return a, b
 
