@@ -210,10 +210,12 @@ class LabDiagnosis:
         return self.in_conflict and self.over_noise > UNEXPLAINED
 
     def may_imitate(self, name: str) -> bool:
-        """Whether an effect of the verdict may imitate something else, or be a part of it: what is left beyond the
-        noise is ``IMITATION`` or more of what the effect and that explain together."""
-        left = max(self.final_error**2 - self.noise_floor_error**2, 0.0)
-        removed = sum(before.error**2 - there.error**2 for before, there in pairwise(self.steps)
+        """Whether an effect of the verdict may imitate something else, or be a part of it: what is left of all signals
+        beyond the noise is ``IMITATION`` or more of what the effect and that explain together."""
+        left = sum(max(after**2 - floor**2, 0.0) for after, floor in (
+            (self.final_error, self.noise_floor_error),
+            *((one.after, one.noise_floor) for one in self.signals.values())))
+        removed = sum(before.power - there.power for before, there in pairwise(self.steps)
                       if there.words == f"with {name}")
         return self.is_doubtful or (self.exceeds_noise and left >= IMITATION * (removed + left))
 
@@ -338,7 +340,9 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
     if colour is not None:
         noise, excess_of = colour, excess_by_signal(fine, state, FALSE_ALARM, colour)
         excess, over_noise = max(excess_of.values()), 0.0
-    left_open = _left_open(fine, state, errors)
+    left_open, beyond = _left_open(fine, state, errors), fine.prior.beyond_tolerance(state.logs, errors.covariance)
+    moved = {name: one for name, one in fine.prior.moved(state.logs, errors.covariance, fine.shows_forces).items()
+             if name not in {**beyond, **left_open}}
     candidates, no_better = candidates_of(search, selection, state.effects,
                                           partial(_best_of_screened, selection.before))
     hidden = undetectable_effects(after, [one for one in tried if one.name not in state.names])
@@ -352,13 +356,10 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
         candidates=candidates, no_better=no_better,
         obstacles=obstacles_of(posterior, effects, present), verdict=tuple(selection.gains), excess=excess,
         over_noise=over_noise, proportional=1.0 if shape is None else share_proportional(shape.residuals),
-        beyond=(beyond := fine.prior.beyond_tolerance(state.logs, errors.covariance)),
-        in_conflict=fine.prior.is_in_conflict(state.logs, errors.logs),
-        moved={name: one for name, one in fine.prior.moved(
-            state.logs, errors.covariance, fine.shows_forces).items() if name not in {**beyond, **left_open}},
-        left_open=left_open,
+        beyond=beyond, in_conflict=fine.prior.is_in_conflict(state.logs, errors.logs), moved=moved, left_open=left_open,
         ends=starts.ends, not_searched=tuple(starts.not_tried),
-        as_moved=effect_as_moved(after, [one for one in tried if one.name not in state.names], left_open),
+        as_moved=effect_as_moved(after, [one for one in tried if one.name not in state.names], left_open)
+        if moved or beyond else None,
         steps=_steps(selection, as_filed(posterior.error(nominal), posterior.tolerance)),
         effects=errors.effects,
         undetectable=hidden, shape=shape if excess > UNEXPLAINED else None, coloured=colour is not None,
@@ -464,11 +465,11 @@ def _gains_more_than_chance(search: Search, before: Baseline, after: LinearModel
 
 def _steps(selection: Selection, nominal: ErrorStep) -> tuple[ErrorStep, ...]:
     """The models of the search in order."""
-    steps = [nominal, ErrorStep(REFITTED, selection.before.hold_out.error)]
-    steps += [ErrorStep(f"with {name}", hold_out.error) for name, hold_out in selection.steps]
+    steps = [nominal, ErrorStep.of(REFITTED, selection.before.hold_out)]
+    steps += [ErrorStep.of(f"with {name}", hold_out) for name, hold_out in selection.steps]
     last = selection.steps[-1][1] if selection.steps else selection.before.hold_out
     if selection.now.hold_out is not last:
-        steps.append(ErrorStep("with the final model", selection.now.hold_out.error))
+        steps.append(ErrorStep.of("with the final model", selection.now.hold_out))
     return tuple(steps)
 
 

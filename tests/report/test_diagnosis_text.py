@@ -11,7 +11,7 @@ import pytest
 from logger.api.lab.diagnose import diagnosis_blocks, diagnosis_json, diagnosis_summary, looks_like, table, untested
 from logger.api.lab.question import DiagnoseQuestion
 from logger.lab.diagnosis import ALREADY_PRESENT, CandidateEffect, LabDiagnosis
-from logger.lab.likelihood.noise_floor import NoiseLevel
+from logger.lab.likelihood.noise_floor import NoiseLevel, SignalErrors
 from logger.lab.residual_tests import run_residual_tests
 from logger.lab.residual_tests.tests import ResidualEvidence
 from logger.lab.residuals.breakdown import breakdown
@@ -99,6 +99,24 @@ def test_beside_something_unexplained_it_is_only_part_or_an_imitation() -> None:
     assert missing.startswith("dry_friction is missing")  # a hundred times what is left
     assert left == ("Something more is missing that no known effect explains: in the worst run the residual is 1.5 "
                     "times the sensor's noise. Beyond that noise it is less than 0.1% of the measured power.")
+
+
+def test_an_effect_that_leaves_another_signal_as_it_was_may_only_imitate() -> None:
+    """A table that gives way moved a wheel otherwise, and a bending body fitted the sensor on the body alone."""
+    steps = (NOTHING.steps[0], ErrorStep(REFITTED, 0.65, 0.96**2), ErrorStep("with dry_friction", 0.16, 0.90**2))
+    found = replace(FOUND, excess=240.0, excess_of={"": 0.1, "wheel": 240.0}, steps=steps,
+                    signals={"wheel": SignalErrors(0.96, 0.90, 0.003)})
+    missing, left, *_ = diagnosis_summary(found)
+    assert missing.startswith("dry_friction explains part of the residual, or imitates something else")
+    assert left.endswith("is 241 times the sensor's noise. Beyond that noise it is 81% of the power of wheel.")
+
+
+def test_what_was_removed_comes_first_where_it_is_most_of_the_residual() -> None:
+    def said(share: float) -> list[str]:
+        return [one.split()[0] for one in diagnosis_summary(replace(NOTHING, removed=replace(
+            AS_USUAL, distance_share=share, clock_ppm=80.0)))]
+
+    assert said(0.6) == ["The", "Nothing", "NRMSE"] and said(0.01) == ["Nothing", "NRMSE", "The"]
 
 
 def test_what_is_left_is_the_share_that_is_not_explained_on_stretches_that_no_fit_saw() -> None:

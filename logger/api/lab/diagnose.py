@@ -26,7 +26,7 @@ from logger.lab.residuals.fitted_laws import RATE, TRAVEL, ForceCurve
 from logger.lab.residuals.unexplained import Shape
 from logger.lab.selection.detectability import DETECTABLE_SIGMA, Undetectable
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION
-from logger.lab.selection.holdout import JUDGED_ON
+from logger.lab.selection.holdout import JUDGED_ON, most_of
 from logger.lab.unknown_road import diagnosis
 from logger.lab.unknown_road.diagnosis import UnknownRoadDiagnosis
 from logger.lab.unknown_road.same_road import NotOneRoad, SameRoad, placed_by_road
@@ -280,8 +280,11 @@ _SUSPECT = 0.1
 
 
 def diagnosis_summary(found: LabDiagnosis) -> list[str]:
-    """What is missing, how certain that is, and what it could be instead: paragraphs."""
-    lines = [*lab_words.removed_words(found.removed, found.band)]
+    """What is missing, how certain that is, and what it could be instead: paragraphs. What was removed comes first
+    where it is most of the residual, else after the errors."""
+    removed = lab_words.removed_by_share(found.removed)
+    lines = [*lab_words.filter_words(found.removed, found.band), *(
+        one.words for one in removed if one.share >= most_of(1.0))]
     if found.contradicted:
         lines.append(f"The runs contradict the vehicle's file in {enumerated(found.contradicted, 'and')}. The search "
                      "therefore treated its parameters as unknown, except those with a stated tolerance.")
@@ -321,7 +324,8 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
               for name, share in found.signals_off.items()]
     lines += _car(found)
     errors, *rises = lab_words.error_words(found.steps, found.noise_floor_error)
-    lines += [f"{errors} {_explained_power(found)}", *rises]
+    lines += [f"{errors} {_explained_power(found)}", *rises, *(
+        one.words for one in removed if one.share < most_of(1.0))]
     lines += signal_errors({name: (one.before, one.after, one.noise_floor) for name, one in found.signals.items()},
                            f"{{}} with {found.steps[0].words}, {{}} finally, noise floor about {{}}")
     lines += _faint(found)
@@ -335,9 +339,12 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
 
 
 def _left_over(found: LabDiagnosis) -> str:
-    left = percent(max(1 - found.explained[1] - found.noise_floor_error**2, 0.0))
-    over = max(found.excess, found.over_noise)
-    return f"{1 + over:.3g} times the sensor's noise. Beyond that noise it is {left} of the measured power"
+    worst = max(found.excess_of, key=found.excess_of.__getitem__, default="")
+    of, power, floor = "the measured power", 1 - found.explained[1], found.noise_floor_error
+    if found.exceeds_noise and worst in found.signals:
+        of, power, floor = f"the power of {worst}", found.signals[worst].after**2, found.signals[worst].noise_floor
+    return (f"{1 + max(found.excess, found.over_noise):.3g} times the sensor's noise. Beyond that noise it is "
+            f"{percent(max(power - floor**2, 0.0))} of {of}")
 
 
 def _explained_power(found: LabDiagnosis) -> str:

@@ -178,7 +178,7 @@ def walk(given: Bench, out: Path, ask: Ask, notify: Say, progress: Progress, exp
     write_text(out / STORY, story_page(story))
     notify(chapter("The end", explain("end", "", "")))
     notify([wrapped(ending(story)), "", f"The whole story as a page: {out / STORY}"])
-    models = Table(("Model", "Error"), [(words, f"{error:.3f}") for words, error in steps(story)])
+    models = Table(("Model", "Error"), [(one.words, f"{one.error:.3f}") for one in steps(story)])
     summary = as_json(story) | {"story": str(out / STORY)}
     return LabStory(
         Blocks([models, *ending(story)]), summary, tuple(steps(story)), story.floor, story, model_of(model),

@@ -3,7 +3,7 @@ frequencies were compared, and what a residual looks like; in sentences, as rows
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -71,22 +71,46 @@ HEADS = ("What", "Share of the residual's power", "")
 def removed_words(found: Removed, band: ComparedBand | None) -> list[str]:
     """What was filtered, drifted and lay elsewhere, with its share of the residual of the model as it stands; nothing
     of what is no more than usual."""
+    return [*filter_words(found, band), *(one.words for one in removed_by_share(found))]
+
+
+def filter_words(found: Removed, band: ComparedBand | None) -> list[str]:
+    """Which frequencies were compared, why, and what lies outside; nothing where all were."""
     lines = band_words(band)
     if found.filter_share > 0 and lines:
         lines[0] += f" {percent(found.filter_share)} of the residual's power lies outside that band."
-    corrected = (f"This causes {percent(found.distance_share)} of the residual's power before any fit; the fits "
-                 "correct it.")
-    if found.distance_error_m > 0:
-        lines.append(f"The distances of these runs are off by up to {found.distance_error_m:.2g} m, more than usual. "
-                     f"{corrected}")
-    if found.clock_ppm:
-        lines.append(f"The recorder's clock runs {abs(found.clock_ppm):.2g} ppm "
-                     f"{'faster' if found.clock_ppm > 0 else 'slower'} than that of the excitation. {corrected}")
-    if found.drifting_sensors:
-        lines.append(f"The sensor drifts ({drift_words(found)}). The motion does not cause the drift, which makes up "
-                     f"{percent(found.drift_share)} of the residual's power before any fit. The lab ignores all "
-                     f"below {LOWEST_HZ:g} Hz; without the drift, the refitted model's NRMSE is {found.error:.3f}.")
     return lines
+
+
+class RemovedCause(NamedTuple):
+    """What drifted or lay elsewhere: its share of the residual of the model as it stands, its name, how much, and all
+    of it in words."""
+
+    share: float
+    name: str
+    size: str
+    words: str
+
+
+def removed_by_share(found: Removed) -> list[RemovedCause]:
+    """What drifted and lay elsewhere, the largest share first."""
+    causes, distance, corrected = [], found.distance_share, (
+        f"This causes {percent(found.distance_share)} of the residual's power before any fit; the fits correct it.")
+    if found.distance_error_m > 0:
+        size = f"up to {found.distance_error_m:.2g} m"
+        causes.append(RemovedCause(distance, "wrong distances", size, (
+            f"The distances of these runs are off by {size}, more than usual. {corrected}")))
+    if found.clock_ppm:
+        causes.append(RemovedCause(distance, "another clock", f"{found.clock_ppm:+.2g} ppm", (
+            f"The recorder's clock runs {abs(found.clock_ppm):.2g} ppm "
+            f"{'faster' if found.clock_ppm > 0 else 'slower'} than that of the excitation. {corrected}")))
+    if found.drifting_sensors:
+        size = drift_words(found)
+        causes.append(RemovedCause(found.drift_share, "sensor drift", size, (
+            f"The sensor drifts ({size}). The motion does not cause the drift, which makes up "
+            f"{percent(found.drift_share)} of the residual's power before any fit. The lab ignores all below "
+            f"{LOWEST_HZ:g} Hz; without the drift, the refitted model's NRMSE is {found.error:.3f}.")))
+    return sorted(causes, reverse=True)
 
 
 def drift_words(found: Removed) -> str:
@@ -118,13 +142,7 @@ def removed_json(found: Removed) -> dict[str, Any]:
 
 def removed_section(found: Removed, band: ComparedBand | None) -> Detail:
     """A page's part on it; nothing where nothing was removed that is more than usual."""
-    rows = []
-    if found.drifting_sensors:
-        rows.append(("sensor drift", percent(found.drift_share), drift_words(found)))
-    if found.distance_error_m > 0:
-        rows.append(("wrong distances", percent(found.distance_share), f"up to {found.distance_error_m:.2g} m"))
-    if found.clock_ppm:
-        rows.append(("another clock", percent(found.distance_share), f"{found.clock_ppm:+.2g} ppm"))
+    rows = [(one.name, percent(one.share), one.size) for one in removed_by_share(found)]
     if band is not None:
         rows.append(("outside the pass band", percent(found.filter_share),
                      f"compared from {band.low_hz:.3g} to {band.high_hz:.3g} Hz"))
@@ -220,16 +238,16 @@ class ModelByModel(CommandResult):
 
 def steps_section(steps: Sequence[ErrorStep], floor: float, *more: Block) -> Detail:
     """The error of each step on what no fit saw, as bars and as a table."""
-    rows = [(f"{number}", words, f"{error:.4f}") for number, (words, error) in enumerate(steps)]
+    rows = [(f"{number}", one.words, f"{one.error:.4f}") for number, one in enumerate(steps)]
     return Detail(MODEL_BY_MODEL, [falling(f"NRMSE on {JUDGED_ON}", steps, floor),
                                    Table(("Step", "Model", "NRMSE"), rows, (0, 1)), *more])
 
 
 def steps_json(steps: Sequence[ErrorStep]) -> list[dict[str, Any]]:
     """The same for a program."""
-    return [{"step": words, "error": error} for words, error in steps]
+    return [{"step": one.words, "error": one.error} for one in steps]
 
 
 def falling(title: str, steps: Sequence[ErrorStep], floor: float) -> Bars:
     """The error of each step, beside the noise."""
-    return Bars(title, "NRMSE", tuple(steps), (floor, "noise floor"))
+    return Bars(title, "NRMSE", tuple((one.words, one.error) for one in steps), (floor, "noise floor"))

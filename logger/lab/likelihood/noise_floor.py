@@ -140,6 +140,21 @@ def signal_errors_of(posterior: Posterior, before: State, after: State) -> dict[
             for one in _by_signal(posterior, after) if one.name}
 
 
+def signals_with_noise(posterior: Posterior, residuals: Sequence[Array]) -> dict[str, tuple[float, float]]:
+    """Normalised r.m.s. errors by residuals (n,) per run, and those that noise makes, of all signals by name; empty
+    where the sensor's acceleration (whose name is empty) is the only one."""
+    if not any(run.signals for run in posterior.runs.runs):
+        return {}
+    found: dict[str, Array] = {}
+    for one in by_signal(posterior.readings, posterior.bands, residuals):
+        counts = sum(int(run.read[run.first:].sum()) for run in one.runs)
+        left = sum(float((part[run.first:]**2).sum()) for run, part in zip(one.runs, one.residuals, strict=True))
+        found[one.name] = found.get(one.name, 0.0) + np.array(
+            [left, counts * _noise_of(one).deviation_mps2**2, counts * one.size**2])
+    return {name: (float(np.sqrt(left / whole)), float(np.sqrt(noise / whole)))
+            for name, (left, noise, whole) in found.items() if whole > 0}
+
+
 def _by_signal(posterior: Posterior, state: State) -> list[SignalResiduals]:
     """Residuals of a state by signal and sensor."""
     return by_signal(posterior.readings, posterior.bands, posterior.residuals(state))

@@ -10,8 +10,8 @@ would extrapolate without limit. It stays as fitted too.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import NamedTuple, Protocol
 
@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from logger.arrays import Array
 from logger.lab.likelihood.map_fit import own_slopes
+from logger.lab.likelihood.noise_floor import signals_with_noise
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.signals import deviance, error_with_rounding_noise
@@ -42,18 +43,32 @@ throughout they hold two thirds."""
 @dataclass(frozen=True)
 class HoldOut:
     """A model on held-out stretches, all of them in turn: its normalised r.m.s. error, and minus twice the
-    log-likelihood of its residuals."""
+    log-likelihood of its residuals.
+
+    signals    where more was measured than the sensor's acceleration (whose name is empty): the error of each signal,
+               and the error that its noise makes, by name
+    """
 
     error: float
     deviance: float
+    signals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def explains_most_beyond(self, without: HoldOut) -> bool:
         """Whether more than half of the power that a smaller model leaves is explained."""
-        return self.error**2 < most_of(without.error**2)
+        return self._left_of(without) < most_of(1.0)
 
     def is_worse_than(self, without: HoldOut) -> bool:
         """Whether the error is larger than that of a smaller model by more than a rounding."""
-        return self.error > (1 + AS_PRINTED) * without.error
+        return self._left_of(without) > (1 + AS_PRINTED)**2
+
+    def _left_of(self, without: HoldOut) -> float:
+        """Share that is left of the power that a smaller model leaves: the mean of the signals, by what that leaves of
+        each beyond its noise."""
+        explicable = {name: max(error**2 - noise**2, 0.0) for name, (error, noise) in without.signals.items()}
+        if not sum(explicable.values()) > 0:
+            return (self.error / without.error)**2 if without.error else 1.0
+        return sum(weight * (self.signals[name][0] / without.signals[name][0])**2
+                   for name, weight in explicable.items() if weight) / sum(explicable.values())
 
 
 def most_of(power: float) -> float:
@@ -113,7 +128,8 @@ def cross_validate(fitted: FittedState, own: Sequence[Array] | None = None) -> H
         for run, residual, part, which, kept in zip(posterior.runs.runs, residuals, columns, sets, unseen, strict=True):
             held = np.flatnonzero(run.counted)[which == fold]
             kept[held] = (residual - step @ part)[held]
-    return HoldOut(error_with_rounding_noise(posterior.readings, unseen), deviance(posterior.bands, unseen))
+    return HoldOut(error_with_rounding_noise(posterior.readings, unseen), deviance(posterior.bands, unseen),
+                   signals_with_noise(posterior, unseen))
 
 
 def _solve_scaled(information: Array, gradient: Array) -> Array:
@@ -130,10 +146,21 @@ def fit_percent(error: float) -> float:
 
 
 class ErrorStep(NamedTuple):
-    """A model: what was done, and its error on what no fit saw."""
+    """A model: what was done, its error on what no fit saw, and the sum of the squares of those of other signals."""
 
     words: str
     error: float
+    others: float = 0.0
+
+    @staticmethod
+    def of(words: str, found: HoldOut) -> ErrorStep:
+        """A model by its errors."""
+        return ErrorStep(words, found.error, sum(error**2 for name, (error, _) in found.signals.items() if name))
+
+    @property
+    def power(self) -> float:
+        """Sum of the squares of the errors of all signals."""
+        return self.error**2 + self.others
 
 
 def as_filed(error: float, tolerance: Tolerance) -> ErrorStep:

@@ -9,6 +9,7 @@ import pytest
 
 from logger.lab.likelihood.distance_error import derivative, signals_off
 from logger.lab.likelihood.map_fit import fit_model
+from logger.lab.likelihood.noise_floor import signals_with_noise
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.signals import JointBands, Readings, by_signal
@@ -95,7 +96,8 @@ def test_joint_bands_are_those_of_each_signal(run: Run) -> None:
     rng = np.random.default_rng(3)
     noise = rng.normal(0, 1, (2, run.count)) * np.array([[0.05], [2e-4]])
     two = replace(with_signals(run, SIGNALS[-1:]), measured_mps2=10 * noise[0], more=10 * noise[1:])
-    joint = Posterior(SimulatedRuns([two], FINE_HZ), CAR, Tolerance()).bands[0]
+    posterior = Posterior(SimulatedRuns([two], FINE_HZ), CAR, Tolerance())
+    joint = posterior.bands[0]
     assert isinstance(joint, JointBands)
     each = [Bands(two), Bands(two, 0)]
     assert joint.deviance(noise.ravel()) == pytest.approx(sum(one.deviance(part) for one, part in
@@ -103,6 +105,9 @@ def test_joint_bands_are_those_of_each_signal(run: Run) -> None:
     white = joint.whitener(noise.ravel())(noise.ravel())
     assert float(white @ white) == pytest.approx(float(joint.freedom.sum()), rel=0.05)
     assert joint.whitener(noise.ravel()).in_time(noise.ravel()).shape == (2 * (two.count - two.first),)
+    errors = signals_with_noise(posterior, [noise.ravel()])
+    assert {*errors} == {"", SIGNALS[-1].name}
+    assert [*errors.values()] == [pytest.approx((0.1, 0.1), rel=0.05)] * 2
 
 
 def test_residuals_by_signal_and_their_errors(run: Run) -> None:

@@ -13,7 +13,7 @@ from logger.lab.diagnosis import refit
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit
 from logger.lab.likelihood.signals import deviance
-from logger.lab.selection.holdout import cross_validate, folds
+from logger.lab.selection.holdout import HoldOut, cross_validate, folds
 from logger.runs import Run, normalised_rms
 from logger.vehicle.effect import Chosen
 from logger.vehicle.named_parameters import coordinates_of, free_parameters_of, with_coordinates
@@ -50,6 +50,16 @@ def test_a_long_run_is_held_out_in_many_stretches_and_a_short_one_in_three(plain
 
     assert np.count_nonzero(np.diff(folds(lasting(182.0)))) == 29
     assert np.count_nonzero(np.diff(folds(lasting(2.5)))) == SETS - 1
+
+
+def test_most_is_explained_of_all_signals_each_by_what_is_left_of_it_beyond_its_noise() -> None:
+    def errors(body: float, wheel: float, noise: float) -> HoldOut:
+        return HoldOut(body, 0.0, {"": (body, 0.01), "wheel": (wheel, noise)})
+
+    assert HoldOut(0.02, 0.0).explains_most_beyond(HoldOut(0.65, 0.0))
+    assert not errors(0.02, 0.90, 0.003).explains_most_beyond(errors(0.65, 0.96, 0.003))  # the wheel moves otherwise
+    assert errors(0.02, 0.40, 0.399).explains_most_beyond(errors(0.65, 0.41, 0.399))  # what it left of it was noise
+    assert errors(0.10, 0.20, 0.003).is_worse_than(errors(0.11, 0.10, 0.003))
 
 
 # --- against fits ---
