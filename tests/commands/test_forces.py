@@ -550,6 +550,20 @@ def test_the_size_of_a_rig_is_known_no_better_than_the_force_that_drives_it(
     assert abs(found["parameters"]["half_gap_m"] - bench.play_m) < 2 * found["standard_errors"]["half_gap_m"] < 1e-5
 
 
+def test_gains_of_one_recorder_are_not_averaged_over_its_runs(tmp_path: Path) -> None:
+    """A mass is known no better than force over acceleration, however many runs one load cell (1 %) and one
+    accelerometer (0.5 %) recorded."""
+    bench, push, moved = ringing(6.0)
+    (tmp_path / "mass.yaml").write_text(bench.yaml.replace("0.8", "0.8 +- 20%").replace("2000.0", "2000 +- 50%"))
+    rng = np.random.default_rng(2)
+    runs = [written(tmp_path / f"run{number}", {
+        "accel_z_mps2": moved["accel_z_mps2"] + rng.normal(0.0, 0.02, len(TIME_S))}, {"force_n": push(TIME_S)}, BODY)
+            for number in range(4)]
+    posterior = bench_with(CompareQuestion(tmp_path / "mass.yaml", runs)).posterior()
+    errors = standard_errors(fit_to_the_end(align(posterior, posterior.start())))
+    assert errors.logs[posterior.prior.names.index("mass_kg")] == pytest.approx(np.hypot(0.01, 0.005), rel=0.02)
+
+
 def test_a_part_is_moved_or_pushed(tmp_path: Path) -> None:
     run = bench_of_a_part(tmp_path)
     text = (run / "excitation.csv").read_text().replace("t_s,displacement_m", "t_s,displacement_m,force_n")

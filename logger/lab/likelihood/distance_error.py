@@ -294,7 +294,7 @@ class RigRecordError(RecordError):
         return np.empty((self.count, 0))
 
     @property
-    def _deviations(self) -> Array:
+    def deviations(self) -> Array:
         """Standard deviations of k. What nothing drives has no second clock."""
         clock = _HELD if self.run.past is Past.FREE else 1.0
         return np.array([*[clock * self.tolerance.clock] * self.places, *self._recorder_deviations])
@@ -304,13 +304,13 @@ class RigRecordError(RecordError):
         return np.ones(self.run.count)
 
     def precision(self, size: ErrorSize) -> Array:
-        return np.diag(self._deviations**-2)
+        return np.diag(self.deviations**-2)
 
     def trend_precisions(self, size: ErrorSize) -> Array:
         return np.empty(0)
 
     def log_determinant(self, size: ErrorSize) -> float:
-        return -2 * float(np.log(self._deviations).sum())
+        return -2 * float(np.log(self.deviations).sum())
 
     @cached_property
     def _from_middle_s(self) -> Array:
@@ -328,6 +328,15 @@ class RigRecordError(RecordError):
             bends = np.stack([derivative(one, rate_hz) for one in rises])
             prediction = (signals + late_s * rises + 0.5 * late_s**2 * bends).ravel()
         return super().with_recorder_error(prediction, k)
+
+    @property
+    def instruments(self) -> list[tuple[object, ...]]:
+        """Of which instrument each of k is: runs of one instrument have one clock and gain. The zero of a part's force
+        is each run's own."""
+        names = ["clock", "gain", "droop", *(one.name for one in self.run.signals)]
+        facts = self.run.facts
+        return [*((name, facts.step_mps2, facts.range_mps2) for name in names),
+                *[("zero", self.run.name)] * self.has_zero]
 
     def without_trend(self, k: Array) -> Array:
         return k

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from logger.arrays import Array
-from logger.lab.likelihood.distance_error import USUAL, ErrorSize, RecordError
+from logger.lab.likelihood.distance_error import USUAL, ErrorSize, RecordError, RigRecordError
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.signals import JointWhitener
 from logger.vehicle.named_parameters import free_parameters_of
@@ -261,6 +261,14 @@ class LinearModel:
         seen = self.posterior.without_insensitive_samples(columns, self._predictions)
         return [one - (record.slopes.T @ cho_solve((root, True), record.projected(whitener(one)))).T
                 for one, record, root, whitener in zip(seen, self._records, self._roots, self.whiteners, strict=True)]
+
+    def pulls_of_instruments(self, columns: Sequence[Array]) -> list[dict[tuple[object, ...], Array]]:
+        """By how much one standard deviation of each number of an instrument, by that, changes the gradient by such
+        derivatives (m, n) in each run of a rig: (m,)."""
+        return [dict(zip(record.error.instruments, record.error.deviations[:, None] * record.projected(whitener(one)),
+                         strict=True))
+                for record, whitener, one in zip(self._records, self.whiteners, columns, strict=True)
+                if isinstance(record.error, RigRecordError)]
 
     def objective(self, predictions: Sequence[Array], logs: Array) -> float:
         """Sum of squares of the whitened residuals and cost of the priors, with the most likely record errors."""

@@ -4,8 +4,9 @@ On a rig squares are weighed by one level, and the noise of its measured input g
 stops make more of it than of all other noise, and the fit follows it. There the covariance is that of the estimates
 themselves (H. White, Econometrica 50, 1982): of the gradient under the noise as it is, between two inverses of the
 information. The noise of the readings has the residual's power in each band; that of the input is drawn. What measured
-the input has a gain as well: lengths and velocities of effects are known no better than the motion. Differences over
-steps do not show exactly that a larger car under larger forces moves the same; the derivatives are made to.
+the input has a gain as well: lengths and velocities of effects are known no better than the motion. Clock and gains of
+the recorder, which a fit lets differ from run to run, are the same in all: more runs do not average them. Differences
+over steps do not show exactly that a larger car under larger forces moves the same; the derivatives are made to.
 
 The numbers of effects differ by many powers of ten (a cubic stiffness has 1e6, a ratio 1), so that the matrix is scaled
 to a diagonal of ones before it is inverted.
@@ -142,6 +143,11 @@ def _scatter(linear: LinearModel, slopes: list[Array] | None, gained: Sequence[A
         pulls += np.stack([linear.whiteners[run](one[run]) for one in drawn]) @ white.T
         gain_pull += white @ linear.whiteners[run](gained[run])
         found += own @ own.T - white @ white.T
+    for pull in (by_run := linear.pulls_of_instruments(columns)):
+        found -= sum(np.outer(one, one) for one in pull.values())
+    for instrument in {one: None for pull in by_run for one in pull}:
+        both = sum(pull[instrument] for pull in by_run if instrument in pull)
+        found += np.outer(both, both)
     return found + pulls.T @ pulls / len(drawn) + np.outer(gain_pull, gain_pull)
 
 
