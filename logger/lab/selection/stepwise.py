@@ -298,6 +298,10 @@ class SearchRound(Generic[P, F]):
     on: object = None
     refit_gain: float = 0.0
 
+    def without(self, one: F, now: object) -> SearchRound[P, F] | None:
+        """The round on a model without one of its fits; None: it was on another."""
+        return replace(self, fits=tuple(fit for fit in self.fits if fit is not one)) if self.on is now else None
+
 
 UNTRIED: SearchRound[Any, Any] = SearchRound((), ())
 _MORE, _OTHERS = "one more effect", "others in the place of what it had found"
@@ -438,8 +442,12 @@ class Search(Generic[M, P, F]):
                 continue
             self.progress(f"{best.effect.name} is missing; fitting the model with it")
             self._rivals[best.effect.name] = self._rivals_of(now, best.gain, best.effect.name, tried)
-            now = self._in_range(self._reconsider(
-                before, grown or self.likelihood.with_effect(best), best.effect.name, now))
+            there = self._in_range(self._reconsider(
+                before, grown or self.likelihood.with_effect(best), best.effect.name, now), now)
+            if there is None:
+                known = tried.without(best, now)
+                continue
+            now = there
             *earlier, added = names_of(now)[self.present:]
             last = UNTRIED
             if not earlier and (refitted := self.without(now, added)).score < before.score - INDISTINGUISHABLE:
@@ -453,8 +461,7 @@ class Search(Generic[M, P, F]):
                 fits, lost, before = cast(tuple[Any, ...], first.fits), before.score - refitted.score, refitted
                 first = replace(first, fits=tuple(replace(one, gain=one.gain - lost) for one in fits), refit_gain=lost)
             steps.append((added, now.hold_out))
-            for name in earlier:
-                now = self._reconsider(before, now, name)
+            now = self._all_reconsidered(before, now, earlier)
         now, gains = self.eliminate_backward(before, now)
         rivals = {name: tuple(one for one in self._rivals.get(name, ()) if one not in gains) for name in gains}
         self._reduced = None
@@ -471,8 +478,7 @@ class Search(Generic[M, P, F]):
         best = wider._simplest(before, first)
         if now is before or (best is not None and best.effect in more):
             return wider, wider.go_on(Selection(before, before, {}, {}, first, ()), first)
-        for name in names_of(now)[self.present:] if wider._promising else ():
-            now = wider._reconsider(before, now, name)
+        now = wider._all_reconsidered(before, now, names_of(now)[self.present:] if wider._promising else ())
         wider._promising |= self._promising
         known = None
         if now is begun.now:
@@ -489,12 +495,16 @@ class Search(Generic[M, P, F]):
                 now = self.likelihood.refined_beside(now, one.effect.name, self.effort.round_share * now.explanation)
         return now
 
-    def _in_range(self, now: M) -> M:
-        """The model with those effects in their plain form whose refinements an effect more has led too far."""
+    def _in_range(self, now: M, without: M) -> M | None:
+        """The model with those effects in their plain form whose refinements an effect more has led too far; None where
+        it is no better then than the model without that effect, which only imitated what is missing."""
+        found = now
         for one in now.effects[self.present:]:
             if one.is_refined_too_far:
-                now = self.likelihood.plain(now, one.effect.name) or now
-        return now
+                found = self.likelihood.plain(found, one.effect.name) or found
+        better = found is now or (found.score < without.score - INDISTINGUISHABLE
+                                  and not found.hold_out.is_worse_than(without.hold_out))
+        return found if better else None
 
     def _before_refinements(self, now: M, names: Sequence[str], untried: Sequence[Effect]
                             ) -> tuple[F | None, M | None, SearchRound[P, F]]:
@@ -530,9 +540,8 @@ class Search(Generic[M, P, F]):
         effect explains a part of it: it may be the right one, and what it would be added to its imitation."""
         if not self.likelihood.is_within_calibration(now) or not any(self.may_imitate(now, one) for one in tried.fits):
             return now
-        other, rivals = now, dict(self._rivals)
-        for name in names_of(now)[self.present:]:
-            other = self._reconsider(before, other, name)
+        rivals = dict(self._rivals)
+        other = self._all_reconsidered(before, now, names_of(now)[self.present:])
         if other.score < now.score - INDISTINGUISHABLE:
             return other
         self._rivals = rivals
@@ -729,6 +738,13 @@ class Search(Generic[M, P, F]):
         elif added_to is not None:
             return now
         self._rivals[name] = (*alike, *self._rivals_of(without, gain, name, tried))
+        return now
+
+    def _all_reconsidered(self, before: M, now: M, names: Sequence[str]) -> M:
+        """The model, or one with others in the place of some of its effects; as ``_reconsider``, one after the other.
+        """
+        for name in names:
+            now = self._reconsider(before, now, name)
         return now
 
     def _rivals_of(self, without: M, gain: float, name: str, tried: SearchRound[P, F]) -> tuple[str, ...]:

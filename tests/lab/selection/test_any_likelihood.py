@@ -12,7 +12,7 @@ import pytest
 from logger.lab.selection.evidence import IMITATION, probability_by_chance
 from logger.lab.selection.holdout import HoldOut
 from logger.lab.selection.stepwise import Progress, Search, SearchEffort
-from logger.vehicle.effect import Chosen, Effect, Misalignment, chosen
+from logger.vehicle.effect import STATIC_RATIO, Chosen, Effect, Misalignment, chosen
 
 from ...support.lab.secret_runs import EFFECTS
 
@@ -267,6 +267,31 @@ def test_what_refinements_imitate_is_found_beside_the_plain_form(monkeypatch: py
     found = sought.run(Made())
     assert [*found.gains] == ["dry_friction", "tire_damping"]
     assert [one.is_plain for one in found.now.effects] == [False, True]
+
+
+class TooFar(MadeUp):
+    """Tire damping leads refinements of friction to an end of their range."""
+
+    def is_at_floor(self, now: Made) -> bool:
+        return True
+
+    def with_effect(self, one: Tried) -> Made:
+        if one.effect.name != "tire_damping":
+            return one.model
+        return replace(one.model, effects=tuple(
+            replace(each, values={**each.values, STATIC_RATIO.name: STATIC_RATIO.high})
+            if each.effect.name == "dry_friction" else each for each in one.model.effects))
+
+
+@pytest.mark.parametrize(("worth", "named"), [(90.0, "sensor_offset"), (120.0, "tire_damping")])
+def test_what_leads_refinements_too_far_is_taken_where_it_is_worth_more_than_they_are(
+        worth: float, named: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(WORTH, "dry_friction", 700.0)
+    monkeypatch.setitem(WORTH, "tire_damping", worth)
+    sought = search(effects=2)
+    sought.effects = [EFFECTS[name] for name in ("dry_friction", "tire_damping", "sensor_offset")]
+    sought.likelihood = TooFar()
+    assert [*sought.run(Made()).gains] == ["dry_friction", named]
 
 
 class Alone(MadeUp):
