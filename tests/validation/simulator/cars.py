@@ -21,7 +21,16 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from .corner_laws import ABSORBER, INNER, SLIP_MPS, absorber_force, damper_force, force_by_travel, force_with_memory
+from .corner_laws import (
+    ABSORBER,
+    INNER,
+    INSIDE,
+    SLIP_MPS,
+    absorber_force,
+    damper_force,
+    force_by_travel,
+    force_with_memory,
+)
 
 Array = NDArray[np.float64]
 
@@ -246,7 +255,7 @@ def _fit(corner: np.void, axle: Axle, extra: Physics) -> None:
     corner["sky"], corner["sky_most"] = extra.sky, extra.sky_most
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INSIDE)
 def _dissipated(state, corners, health):
     """The power [W] that all dampers turn into heat, where nothing is in series with them."""
     n = corners.size
@@ -259,7 +268,7 @@ def _dissipated(state, corners, health):
     return power
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INSIDE)
 def _rates(state, out, body, corners, road, road_rate, dry, health, warmth):
     """d(state)/dt into ``out``; ``dry`` is each corner's present friction force, ``health`` what fading and the
     driving speed made of the dampers, ``warmth`` what warming made of the tires."""
@@ -311,7 +320,7 @@ def _rates(state, out, body, corners, road, road_rate, dry, health, warmth):
     out[m + _ROLL] = tilt / body.roll
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INSIDE)
 def _rub(state, dry, body, corners, dt):
     """Correct the friction forces so that each corner sticks if it can, and the rates with them."""
     n = corners.size
@@ -331,6 +340,12 @@ def _rub(state, dry, body, corners, dt):
             state[m + _PITCH] += push * c.ahead / body.pitch
             state[m + _ROLL] += push * c.left / body.roll
             state[m + _BEND] += push * body.bend_gain
+
+
+@njit(**INSIDE)
+def _go_along(trial, state, by, rates):
+    for j in range(trial.size):
+        trial[j] = state[j] + by * rates[j]
 
 
 @njit(cache=True, error_model="numpy", nogil=True)
@@ -356,7 +371,8 @@ def integrate(body, corners, road, road_rate, dt, sticks, first, keep, firmness)
         motion[step, 1] = state[m + _PITCH]
         motion[step, 2] = state[m + _BEND]
         if keep:
-            states[step] = state
+            for j in range(size):
+                states[step, j] = state[j]
         if step == steps:
             break
         if body.fade > 0:
@@ -368,14 +384,11 @@ def integrate(body, corners, road, road_rate, dt, sticks, first, keep, firmness)
             warmth = 1 + body.warm * (1 - np.exp(-step * dt / body.warm_s))
         h, fit = 2 * step, health * firmness[step]
         _rates(state, k1, body, corners, road[h], road_rate[h], dry, fit, warmth)
-        for j in range(size):
-            trial[j] = state[j] + 0.5 * dt * k1[j]
+        _go_along(trial, state, 0.5 * dt, k1)
         _rates(trial, k2, body, corners, road[h + 1], road_rate[h + 1], dry, fit, warmth)
-        for j in range(size):
-            trial[j] = state[j] + 0.5 * dt * k2[j]
+        _go_along(trial, state, 0.5 * dt, k2)
         _rates(trial, k3, body, corners, road[h + 1], road_rate[h + 1], dry, fit, warmth)
-        for j in range(size):
-            trial[j] = state[j] + dt * k3[j]
+        _go_along(trial, state, dt, k3)
         _rates(trial, k4, body, corners, road[h + 2], road_rate[h + 2], dry, fit, warmth)
         for j in range(size):
             state[j] += dt / 6 * (k1[j] + 2 * k2[j] + 2 * k3[j] + k4[j])

@@ -10,6 +10,8 @@ import numpy as np
 from numba import njit
 
 SLIP_MPS = 0.002
+INSIDE = {"cache": True, "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+"""Of what compiled code alone calls: ways in from Python take as long to compile."""
 _RUBBER, _BUSHING, _INERTER, ABSORBER, INNER = 1, 2, 3, 5, 7
 
 
@@ -29,7 +31,7 @@ def damper_rate_of(force, bump, rebound, knee, slope):
     return speed if force >= 0 else -speed
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INSIDE)
 def force_by_travel(x, v, c):
     """Springs, stops, quadratic damping, and friction that falls with the rate (Stribeck)."""
     force = c.spring * x + c.cubic * x * x * x + c.square * v * abs(v)
@@ -44,7 +46,7 @@ def force_by_travel(x, v, c):
     return force
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INSIDE)
 def force_with_memory(state, out, c, x, v, at, n, health):
     """The damper, on its mount if it has one, rubber, bushing and inerter; their rates go into ``out``."""
     here = health * (1 + c.by_place * x * x)
@@ -75,7 +77,7 @@ def force_with_memory(state, out, c, x, v, at, n, health):
     return force
 
 
-@njit(cache=True, error_model="numpy")
+@njit(**INSIDE)
 def absorber_force(state, out, c, wheel, wheel_rate, at, n):
     """What a mass that hangs on the wheel by a spring and a damper does to it; its rates go into ``out``."""
     place, rate = at + ABSORBER * n, at + (ABSORBER + 1) * n

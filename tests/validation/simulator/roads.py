@@ -128,7 +128,8 @@ def wheel_path(road, spacing_m, at_m, speed_mps, patch_m):
     pieces of parabolas: no sampling of the average is involved.
     """
     area = np.zeros(road.size)
-    area[1:] = np.cumsum(0.5 * spacing_m * (road[1:] + road[:-1]))
+    for i in range(1, road.size):
+        area[i] = area[i - 1] + 0.5 * spacing_m * (road[i] + road[i - 1])
     height, rate = np.empty(at_m.size), np.empty(at_m.size)
     for i in range(at_m.size):
         if patch_m > 0:
@@ -142,7 +143,7 @@ def wheel_path(road, spacing_m, at_m, speed_mps, patch_m):
     return height, rate
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def _look_up(road, area, spacing_m, at_m):
     """Elevation, its integral from the first sample, and slope."""
     place, last = at_m / spacing_m, road.size - 1
