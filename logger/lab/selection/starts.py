@@ -10,7 +10,7 @@ squares, and only from there the likelihood decides. The model without the effec
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -147,12 +147,12 @@ class UnknownNumbers(MeasuredRoad):
             drafted = one.effect.sought is Sought.NEVER  # by the motions of the records, as it begins
             drawn = [] if drafted else self._cars(by_squares, one.effect, anchor, one.trials, numbers)
             forms = [some for some in drawn if _is_plain(some[0])] or drawn
-            ends, others = _improved(pool, by_squares, [each for some in forms for each in some], least)
+            ends, others = _improved(pool.map, by_squares, [each for some in forms for each in some], least)
             forms = [some for some in drawn if some not in forms]
             refined = [some[0] for some in forms]
             others += [each for some in forms for each in some[1 : self.starts]]
             if ends and ends[0][0] < least:
-                ends += _improved(pool, by_squares, refined, _explaining_most(by_squares, _plain(ends)))[0]
+                ends += _improved(pool.map, by_squares, refined, _explaining_most(by_squares, _plain(ends)))[0]
                 ends.sort(key=_by_deviance)
                 refined = []
             if near is not None and one.effect is near.effect and ends and ends[0][0] > known - INDISTINGUISHABLE:
@@ -243,9 +243,9 @@ class UnknownNumbers(MeasuredRoad):
         here = by_squares.at(near.effects, near.logs, near)
         begun = dict([] if here is None else [here])
         begun |= dict(one for some in self._cars(by_squares, None, near) for one in some[:count])
-        ends = list(map(by_squares.improved, begun.values()))
+        ends, _ = _improved(map, by_squares, [*begun.items()], np.inf)
         self._keep(ends)
-        return min(ends, key=_by_deviance)[1]
+        return ends[0][1]
 
     def _keep(self, *ends: Sequence[_Drawn]) -> None:
         """Ends of starts, each of one model, where later rounds begin."""
@@ -353,7 +353,7 @@ def _explaining_most(by_squares: BySquares, deviance: float) -> float:
     return deviance + by_squares.posterior.freedom * float(np.log(most_of(1.0)))
 
 
-def _improved(pool: ThreadPoolExecutor, by_squares: BySquares, begun: Sequence[_Drawn], to_reach: float
+def _improved(over: Callable[..., Iterable[_Drawn]], by_squares: BySquares, begun: Sequence[_Drawn], to_reach: float
               ) -> tuple[list[_Drawn], list[_Drawn]]:
     """Cars improved as long as they may reach a deviance, and the two best of those that were left behind; the best
     first. Which of many lie in the valley shows after some rounds, not before (measured: of a rig whose body rubs on
@@ -362,7 +362,7 @@ def _improved(pool: ThreadPoolExecutor, by_squares: BySquares, begun: Sequence[_
     2016)."""
     def further(some: Sequence[_Drawn], rounds: int, later: int) -> list[_Drawn]:
         improved = partial(by_squares.improved, rounds=rounds, later=later, to_reach=to_reach)
-        return sorted(pool.map(improved, [state for _, state in some]), key=_by_deviance)
+        return sorted(over(improved, [state for _, state in some]), key=_by_deviance)
 
     now, behind = list(begun), list[_Drawn]()
     while len(now) > 2:
