@@ -22,6 +22,7 @@ from logger.lab.likelihood.standard_errors import standard_errors
 from logger.lab.residual_tests import run_residual_tests
 from logger.lab.residual_tests.tests import ResidualEvidence, ResidualTestResult, ResidualTestResults
 from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown
+from logger.lab.residuals.force_gain import force_gain
 from logger.lab.residuals.unexplained import Removed, removed_from
 from logger.lab.selection.holdout import REFITTED, ErrorStep, as_filed, cross_validate
 from logger.lab.selection.starts import fitted_from_starts
@@ -63,6 +64,7 @@ class LabComparison:
     floor       the error that the sensor's noise alone makes
     removed     sensor drift, distance error and filtering, which are removed from the error before it is judged
     tests       of the residuals of the refitted model, without the drift of its sensors
+    force_gain  how many times what they say the forces that drive a rig count, as ``force_gain``
     """
 
     vehicle: str
@@ -75,6 +77,7 @@ class LabComparison:
     floor: float
     removed: Removed
     tests: ResidualTestResults
+    force_gain: float | None = None
 
     @property
     def band(self) -> ComparedBand | None:
@@ -132,7 +135,7 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
                          (as_filed(plain.error, posterior.tolerance),
                           ErrorStep(REFITTED, cross_validate(linear).error)),
                          floor_error(posterior, sensor_noise_with_rounding(posterior, state)),
-                         removed, _tests(refitted, removed, plain))
+                         removed, _tests(refitted, removed, plain), force_gain(linear))
 
 
 def _tests(refitted: Standing, removed: Removed, plain: Standing) -> ResidualTestResults:

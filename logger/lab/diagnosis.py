@@ -35,6 +35,7 @@ from logger.lab.likelihood.standard_errors import StandardErrors, deviations_fro
 from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.residuals.breakdown import ModelResiduals
 from logger.lab.residuals.fitted_laws import FittedCar, fitted_car
+from logger.lab.residuals.force_gain import force_gain
 from logger.lab.residuals.road_coherence import best_linear_share, share_proportional
 from logger.lab.residuals.unexplained import Removed, Shape, coloured_noise, removed_from, shape_of
 from logger.lab.selection.candidate_fit import CandidateFit
@@ -121,6 +122,7 @@ class LabDiagnosis:
     signals              errors of other signals than the sensor's acceleration, by name
     signals_off          by what share one of these reads more than all else that was measured says, by name, where it
                          is more than a sensor's gain is off by
+    force_gain           of the refitted model, as ``force_gain``; None: as they say
     excess_of            as ``excess``, by signal; empty: the sensor's acceleration
     band                 in which the runs were compared; None: all
     state                of the model that it ends with
@@ -152,6 +154,7 @@ class LabDiagnosis:
     removed: Removed
     signals: Mapping[str, SignalErrors] = field(default_factory=dict)
     signals_off: Mapping[str, float] = field(default_factory=dict)
+    force_gain: float | None = None
     excess_of: Mapping[str, float] = field(default_factory=dict)
     band: ComparedBand | None = None
     state: State | None = None
@@ -366,6 +369,7 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
         removed=removed, band=compared_band(fine.runs.runs), signals=signal_errors_of(fine, baseline, state),
         shows_forces=fine.shows_forces, best_linear=_best_linear(selection),
         signals_off=signals_off(fine.record_errors, state.record), excess_of=excess_of,
+        force_gain=force_gain(selection.before.linear),
         state=state, car=fitted_car(fine, baseline, state), tolerance=posterior.tolerance.share,
     )
 

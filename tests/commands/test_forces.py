@@ -916,6 +916,23 @@ def test_waves_below_the_bounce_of_a_rig_that_nobody_knows_say_nothing_of_its_wa
     assert main(["compare", "--vehicle", str(tmp_path / "bench.yaml"), str(run)]) == 0
 
 
+@pytest.mark.parametrize(("pushed", "guide_n", "words"), [
+    (-1.0, 0.0, "Forces of the opposite sign would explain most"), (1.0, 0.0, None),
+    *slow((0.22481, 0.0, "Forces about 3 times as large would explain most"), (1.0, 1.0, None))],
+    ids=["sign", "right", "pounds", "friction"])
+def test_a_force_that_is_not_what_it_says_is_said(
+        pushed: float, guide_n: float, words: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Beside a base that moves it more."""
+    bench, push = Bench(2.5, 900.0, 12.0, 0.0, 0.4, 5400.0, guide_n=guide_n), noise(20.0, 2.0, 2)
+    base = noise(15.0, 0.006, 1)
+    record = {"accel_z_mps2": bench.moved(base, push, NOTHING)["accel_z_mps2"]}
+    run = written(tmp_path / "run", record, {"elevation_m": base(TIME_S), "force_n": pushed * push(TIME_S)}, BODY)
+    (tmp_path / "bench.yaml").write_text(bench.yaml)
+    assert main(["compare", "--vehicle", str(tmp_path / "bench.yaml"), str(run)]) == 0
+    found = " ".join(capsys.readouterr().out.split())
+    assert words in found if words else "Forces" not in found
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("read", "pushed", "words"), [
     (1 / 9.80665, 1.0, r"0\.10\d times .* it looks like accel_z_mps2 in g \("),

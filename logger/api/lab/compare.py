@@ -205,6 +205,7 @@ def headline(found: LabComparison) -> list[str]:
     lines += signal_errors({name: (error, refitted.signals[name]) for name, error in plain.signals.items()},
                            "{}, refitted {}")
     lines += lab_words.removed_words(found.removed, found.band)
+    lines += lab_words.force_words(found.force_gain)
     if found.repeats is not None:
         apart = found.repeats.deviation_mps2
         lines.append(f"{' and '.join(found.repeats.names)} are repeats and differ by {apart:.2g} {unit} r.m.s. from "

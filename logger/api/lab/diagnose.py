@@ -322,7 +322,7 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
     lines += [f"{name} is {share:+.1%} off against all other signals, more than a calibration error: check its scale "
               "and its unit. The search for effects corrected it."
               for name, share in found.signals_off.items()]
-    lines += _car(found)
+    lines += [*lab_words.force_words(found.force_gain), *_car(found)]
     errors, *rises = lab_words.error_words(found.steps, found.noise_floor_error)
     lines += [f"{errors} {_explained_power(found)}", *rises, *(
         one.words for one in removed if one.share < most_of(1.0))]

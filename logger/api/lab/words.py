@@ -188,6 +188,15 @@ def error_words(steps: Sequence[ErrorStep], floor: float, of: str = f"on {JUDGED
     return lines
 
 
+def force_words(gain: float | None) -> list[str]:
+    """That the forces that drive a rig are not what they say."""
+    if gain is None:
+        return []
+    which = "of the opposite sign" if gain < 0 else f"about {gain:.1g} times as large"
+    return [f"Forces {which} would explain most of the residual of the refitted model: are sign and unit of "
+            "excitation.csv right, and what run.yaml says they act on?"]
+
+
 def error_and_fit(error: float) -> str:
     """An error with its fit per cent: "0.153 (fit 84.7 %)"."""
     return f"{error:.3f} (fit {fit_percent(error):.1f} %)"
