@@ -283,7 +283,7 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
     """What is missing, how certain that is, and what it could be instead: paragraphs. What was removed comes first
     where it is most of the residual, else after the errors."""
     removed = lab_words.removed_by_share(found.removed)
-    lines = [*lab_words.filter_words(found.removed, found.band), *(
+    lines = [*lab_words.force_words(found.force_gain), *lab_words.filter_words(found.removed, found.band), *(
         one.words for one in removed if one.share >= most_of(1.0))]
     if found.contradicted:
         lines.append(f"The runs contradict the vehicle's file in {enumerated(found.contradicted, 'and')}. The search "
@@ -322,7 +322,7 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
     lines += [f"{name} is {share:+.1%} off against all other signals, more than a calibration error: check its scale "
               "and its unit. The search for effects corrected it."
               for name, share in found.signals_off.items()]
-    lines += [*lab_words.force_words(found.force_gain), *_car(found)]
+    lines += _car(found)
     errors, *rises = lab_words.error_words(found.steps, found.noise_floor_error)
     lines += [f"{errors} {_explained_power(found)}", *rises, *(
         one.words for one in removed if one.share < most_of(1.0))]
