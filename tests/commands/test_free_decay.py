@@ -56,6 +56,14 @@ def test_no_error_of_the_file_is_said_where_it_gives_no_numbers(tmp_path: Path) 
     assert "with the vehicle's file unchanged" in " ".join(found.split())
 
 
+def test_ten_samples_a_second_are_compared(tmp_path: Path) -> None:
+    """No low-pass is looked for below a third of them."""
+    drive = decay(tmp_path / "run", lasts_s=6.0) / "drive.csv"
+    head, *rows = drive.read_text().splitlines()
+    drive.write_text("\n".join([head, *rows[::10]]) + "\n")
+    assert called("compare", "--tolerance", "0.5", "--vehicle", tmp_path / "vehicle.yaml", drive.parent).returncode == 0
+
+
 def test_what_was_held_before_is_cut_off_and_said(tmp_path: Path) -> None:
     decay(tmp_path / "run"), decay(tmp_path / "held", held=150)
     asked = "--vehicle", tmp_path / "vehicle.yaml", "--free", "stiffness_n_per_m,damping_n_s_per_m", "--json"

@@ -200,7 +200,7 @@ def _detect_low_pass(fits: "Sequence[_Fits]", rate_hz: float, common: bool) -> L
     """The low-pass that some runs went through; None: none. ``common``: they are all the runs of one recorder."""
     plain = sum(one.plain * one.size for one in fits)
     at_most = plain - np.log(10) / 10 * _BETTER_DB * sum(one.size for one in fits)
-    if at_most < 0:
+    if at_most < 0 or not len(_cutoffs_hz(rate_hz)):
         return None
     table = sum((one.filtered * one.size for one in fits), np.zeros_like(fits[0].filtered))
     place = np.unravel_index(int(table.argmin()), table.shape)
