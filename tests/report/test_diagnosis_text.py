@@ -104,10 +104,11 @@ def test_beside_something_unexplained_it_is_only_part_or_an_imitation() -> None:
 def test_an_effect_that_leaves_another_signal_as_it_was_may_only_imitate() -> None:
     """A table that gives way moved a wheel otherwise, and a bending body fitted the sensor on the body alone."""
     steps = (NOTHING.steps[0], ErrorStep(REFITTED, 0.65, 0.96**2), ErrorStep("with dry_friction", 0.16, 0.90**2))
-    found = replace(FOUND, excess=240.0, excess_of={"": 0.1, "wheel": 240.0}, steps=steps,
+    found = replace(FOUND, excess=240.0, excess_of={"": 0.01, "wheel": 240.0}, steps=steps,
                     signals={"wheel": SignalErrors(0.96, 0.90, 0.003)})
-    missing, left, *_ = diagnosis_summary(found)
+    missing, left, where, *_ = diagnosis_summary(found)
     assert missing.startswith("dry_friction explains part of the residual, or imitates something else")
+    assert where.endswith("sign and filter: if they are right, dry_friction may be an imitation.")
     assert left.endswith("is 241 times the sensor's noise. Beyond that noise it is 81% of the power of wheel.")
 
 

@@ -308,8 +308,10 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
         lines.append(f"Something {'more ' * bool(found.missing)}is missing that no known effect explains: in the worst "
                      f"run the residual is {_left_over(found)}.")
         if found.contradicted_by:
+            imitating = " and ".join(filter(found.may_imitate, found.verdict))
+            though = f": if they are right, {imitating} may be an imitation" * bool(imitating)
             lines.append(f"It appears only in {enumerated(found.contradicted_by, 'and')}; the model explains the other "
-                         "signals down to their noise. Check that sensor's position, sign and filter.")
+                         f"signals down to their noise. Check that sensor's position, sign and filter{though}.")
         if any(one.p_value < FALSE_ALARM and one.effect.name not in found.verdict for one in found.candidates):
             lines.append(f"ridelog does not name an effect that gains less than {IMITATION:.0%} of what a full "
                          "explanation would gain: it may only imitate what is missing.")

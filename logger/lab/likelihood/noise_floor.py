@@ -29,7 +29,7 @@ from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.signals import SignalResiduals, by_signal
 from logger.lab.likelihood.whittle import UNEXPLAINED, Bands
 from logger.profiles.excitation import Excitation
-from logger.runs import Run, signal_errors
+from logger.runs import Run
 
 
 @dataclass(frozen=True)
@@ -135,9 +135,8 @@ def sensor_noise_with_rounding(posterior: Posterior, state: State) -> NoiseLevel
 
 def signal_errors_of(posterior: Posterior, before: State, after: State) -> dict[str, SignalErrors]:
     """Errors of the other signals than the sensor's acceleration, by name, under one model and under another."""
-    was, now = (signal_errors(posterior.runs.runs, one.predictions) for one in (before, after))
-    return {one.name: SignalErrors(was[one.name], now[one.name], _noise_of(one).deviation_mps2 / one.size)
-            for one in _by_signal(posterior, after) if one.name}
+    was, now = (signals_with_noise(posterior, posterior.residuals(one)) for one in (before, after))
+    return {name: SignalErrors(was[name][0], *now[name]) for name in now if name}
 
 
 def signals_with_noise(posterior: Posterior, residuals: Sequence[Array]) -> dict[str, tuple[float, float]]:
