@@ -54,6 +54,9 @@ def test_no_error_of_the_file_is_said_where_it_gives_no_numbers(tmp_path: Path) 
     guessed, found = (called("compare", "--vehicle", one, run).stdout for one in (vehicle, fitted))
     assert "with guesses for what the vehicle's file leaves unknown" in " ".join(guessed.split())
     assert "with the vehicle's file unchanged" in " ".join(found.split())
+    added = called("add-effect", "dry_friction", "--vehicle", vehicle, "--out", tmp_path / "added.yaml", run).stdout
+    assert "guesses for what the vehicle's file leaves unknown" in next(
+        line for line in added.splitlines() if line.startswith("Before"))
 
 
 def test_ten_samples_a_second_are_compared(tmp_path: Path) -> None:

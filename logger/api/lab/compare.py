@@ -26,7 +26,7 @@ from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.residuals.breakdown import ModelResiduals, Part, frequencies, segments
 from logger.lab.residuals.force_state_map import Curve, ForceMap
 from logger.lab.selection.add_effect import AddedEffects, ShiftedNumber
-from logger.lab.selection.holdout import JUDGED_ON, fit_percent
+from logger.lab.selection.holdout import AS_GUESSED, JUDGED_ON, fit_percent
 from logger.left_out import left_out_json, left_out_lines
 from logger.printable import counted
 from logger.question import function
@@ -532,7 +532,8 @@ def errors(found: AddedEffects) -> Table:
     """The error before, after and of the noise: which of them, the error, its fit, and what it is of."""
     return Table(("", "NRMSE", "Fit", ""), [(which, f"{error:.4f}", f"{fit_percent(error):.1f} %", what)
                                             for which, error, what in (
-        ("Before", found.error_before, "vehicle's file and distances as they are"),
+        ("Before", found.error_before, AS_GUESSED if found.filed == AS_GUESSED else
+         "vehicle's file and distances as they are"),
         ("", found.error_refitted, f"parameters and distances refitted, on {JUDGED_ON}"),
         ("After", found.error_after, f"refitted with {' and '.join(found.names)}, on {JUDGED_ON}"),
         ("", found.error_as_written, "new file and distances as they are"),
