@@ -196,13 +196,17 @@ class Passage:
         return self.driving(structure)[0]
 
     def driving(self, structure: Structure) -> tuple[Array, Bools]:
-        """``means_and_rises``, and which of them are not 0 all the time (2 u,)."""
+        """``means_and_rises``, and which of them may be anything but 0 (2 u,): a road's inputs all."""
         inputs, mean = self.under_wheels(structure)
         found = self._driving[0]  # also of the same passage begun in another state
         if found[0] is not inputs:
-            around = np.concatenate([2 * inputs[:1] - mean[:1], mean, 2 * inputs[-1:] - mean[-1:]])
-            driving = np.hstack([mean, (around[2:] - around[:-2]) / 4])
-            found = self._driving[0] = inputs, driving, np.asarray(driving.any(axis=0))
+            driving = np.empty((len(mean), 2 * mean.shape[1]))
+            driving[:, :mean.shape[1]], rises = mean, driving[:, mean.shape[1]:]
+            np.subtract(mean[2:], mean[:-2], out=rises[1:-1])
+            rises[0], rises[-1] = mean[1] - (2 * inputs[0] - mean[0]), 2 * inputs[-1] - mean[-1] - mean[-2]
+            rises /= 4
+            moves = driving.any(axis=0) if structure.on_base else np.ones(driving.shape[1], bool)
+            found = self._driving[0] = inputs, driving, np.asarray(moves)
         return found[1:]
 
     def smooth_inputs(self, structure: Structure) -> Array:
