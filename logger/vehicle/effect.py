@@ -74,6 +74,7 @@ class Parameter:
     default    what it is when nothing is said; None: it must be said
     step       slopes are taken over so much of it, on its scale; None: a small share of it
     given      it is what it was given, or what a search begins at: no fit moves it
+    may_end    a fit may end at an end of its range: what it shapes is a part of the effect that may not be there
     """
 
     name: str
@@ -88,6 +89,7 @@ class Parameter:
     default: float | None = None
     step: float | None = None
     given: bool = False
+    may_end: bool = False
 
     @property
     def allowed(self) -> str:
@@ -431,7 +433,7 @@ class Chosen:
             return True
         if any(one.null is not None for one in numbers) and all(one.at_bound(self.values[one.name]) for one in numbers):
             return True
-        shapes = [one for one in numbers if one.null is None]
+        shapes = [one for one in numbers if one.null is None and not one.may_end]
         return len(shapes) < len(numbers) and any(
             one.is_at(end, self.values[one.name])
             for one in shapes for end in (one.low, one.high) if end != one.default)

@@ -106,6 +106,7 @@ class CornerLaws:
     stiffness_n_per_m       of the linear spring
     damper                  the damper's force by its own rate: rate [m/s] -> force [N]; grows with the rate
     mount_n_per_m           stiffness of a mount in series with the damper; infinite: none
+    mount_play_m            play in series with both, either way from rest; of a mount that is no spring it is not felt
     springs                 forces by travel beyond the linear spring: travel [m] -> force [N]
     dry_friction_n          Coulomb friction parallel to the damper: this force against any motion, up to it at rest
     friction_transition_mps this times tanh(rate / transition) instead, unless 0
@@ -125,6 +126,7 @@ class CornerLaws:
     stiffness_n_per_m: float
     damper: Law
     mount_n_per_m: float = np.inf
+    mount_play_m: float = 0.0
     springs: tuple[Law, ...] = ()
     dry_friction_n: float = 0.0
     friction_transition_mps: float = 0.0

@@ -173,7 +173,7 @@ def _check_stands(structure: Structure, name: str) -> None:
 def _check_numbers(laws: CornerLaws, before: CornerLaws) -> None:
     """ValueError for numbers that no corner has."""
     for name in ("dry_friction_n", "friction_transition_mps", "wheel_friction_n", "body_friction_n",
-                 "guide_transition_mps", "tire_damping_n_s_per_m", "mount_n_per_m"):
+                 "guide_transition_mps", "tire_damping_n_s_per_m", "mount_n_per_m", "mount_play_m"):
         value = getattr(laws, name)
         infinite = name == "mount_n_per_m" and value == np.inf
         if not (infinite or (np.ndim(value) == 0 and np.isfinite(value) and value >= 0)):

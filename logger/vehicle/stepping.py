@@ -245,7 +245,7 @@ def _tabulated(structure: Structure, laws: Sequence[CornerLaws], step_s: float) 
         pairs.append(_pairs(one.others, paired))
         numbers.append([bool(one.springs), bool(damper.any()), mounted, bool(one.tires), bool(one.others),
                         one.mount_n_per_m if mounted else 0.0, low, 1 / step, one.damping_n_s_per_m, structure.tires[i],
-                        one.tire_damping_n_s_per_m, np.inf if one.tire_pulls else loads[i]])
+                        one.tire_damping_n_s_per_m, np.inf if one.tire_pulls else loads[i], one.mount_play_m])
     return tables, np.array(pairs), np.array(numbers, dtype=float)
 
 

@@ -292,7 +292,8 @@ _SLOW_DECAY = 1e-5
 # Rows of the tables of one variable.
 SPRING, DAMPER, MOUNT, TIRE = range(4)
 # Columns of the numbers of a corner: whether it has these tables and one of two variables, and then
-PAIR, MOUNT_N_PER_M, MOUNT_LOW, MOUNT_PER_UNIT, DAMPING, TIRE_N_PER_M, TIRE_DAMPING, MOST_PULL_N = range(4, 12)
+(PAIR, MOUNT_N_PER_M, MOUNT_LOW, MOUNT_PER_UNIT, DAMPING, TIRE_N_PER_M, TIRE_DAMPING, MOST_PULL_N,
+ MOUNT_PLAY_M) = range(4, 13)
 # Of what rubs: its force, how it grows with the rate, and at which share of a step it looks at it; and whole numbers,
 # where its rate stands in the motion and at which suspension and tire it is recorded (-1: at none).
 FRICTION_N, FRICTION_MPS, FRICTION_AT, STATIC_RATIO, STRIBECK_MPS = range(5)
@@ -361,11 +362,13 @@ def _suspension(
     if numbers[i, PAIR]:
         force += _read_pair(pairs, i, travel, rate)
     if numbers[i, MOUNT]:
-        stiffness = numbers[i, MOUNT_N_PER_M]
+        stiffness, play = numbers[i, MOUNT_N_PER_M], numbers[i, MOUNT_PLAY_M]
         carried = mounts[i, 0] + 0.5 * step_s * rate
-        mounts[i, 2] = _read(tables, MOUNT, i, numbers[i, MOUNT_LOW], numbers[i, MOUNT_PER_UNIT], stiffness * carried)
+        # Within its play the damper stands still, and what it does beyond leaves the mount on that side.
+        pressed = carried - min(max(carried, -play), play)
+        mounts[i, 2] = _read(tables, MOUNT, i, numbers[i, MOUNT_LOW], numbers[i, MOUNT_PER_UNIT], stiffness * pressed)
         mounts[i, 1] = carried - 0.5 * step_s * mounts[i, 2]
-        force += stiffness * mounts[i, 1] - numbers[i, DAMPING] * rate
+        force += stiffness * (mounts[i, 1] - min(max(mounts[i, 1], -play), play)) - numbers[i, DAMPING] * rate
     elif numbers[i, DAMPER]:
         force += _read(tables, DAMPER, i, -RATE_MPS, per_unit / RATE_MPS, rate)
     return force

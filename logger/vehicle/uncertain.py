@@ -110,7 +110,13 @@ class NumberErrors:
 
 
 def cars_off(vehicle: Vehicle, effects: Sequence[Chosen], errors: NumberErrors | None) -> tuple[KnownCar, ...]:
-    """The cars a standard error away, one for each independent direction.
+    """The cars a standard error away, as ``models_off`` has them."""
+    return tuple(known_vehicle(*one) for one in models_off(vehicle, effects, errors))
+
+
+def models_off(vehicle: Vehicle, effects: Sequence[Chosen], errors: NumberErrors | None
+               ) -> tuple[tuple[Vehicle, Sequence[Chosen]], ...]:
+    """A vehicle with its effects a standard error away, one for each independent direction.
 
     errors    of the model's numbers; the effects' own standard errors count for those of their numbers that it lacks
 
@@ -129,8 +135,9 @@ def cars_off(vehicle: Vehicle, effects: Sequence[Chosen], errors: NumberErrors |
                  for step, variance in zip(steps, variances, strict=True) if variance > _LEAST_VARIANCE)
 
 
-def _moved(vehicle: Vehicle, effects: Sequence[Chosen], steps: Mapping[str, float]) -> KnownCar:
-    """The car with its numbers moved by as much; sizes by factors, so that they stay sizes."""
+def _moved(vehicle: Vehicle, effects: Sequence[Chosen], steps: Mapping[str, float]
+           ) -> tuple[Vehicle, Sequence[Chosen]]:
+    """The vehicle with its numbers moved by as much; sizes by factors, so that they stay sizes."""
     numbers, others = {}, list(effects)
     places = {one.effect.name: place for place, one in enumerate(effects)}
     for name, step in steps.items():
@@ -146,7 +153,7 @@ def _moved(vehicle: Vehicle, effects: Sequence[Chosen], steps: Mapping[str, floa
         else:
             value = read(vehicle, name)
             numbers[name] = value * exp(max(-_FARTHEST, min(step / value, _FARTHEST))) if value > 0 else value + step
-    return known_vehicle(changed(vehicle, numbers), others)
+    return changed(vehicle, numbers), others
 
 
 def not_known(iri_share_std: float) -> str:

@@ -22,7 +22,7 @@ from logger.chart_data import MOST_DOTS, Array, Bars, Curves, Line
 from logger.errors import BadInput
 from logger.extraction.along_track import MeasuredLine
 from logger.lab.diagnosis import LabDiagnosis
-from logger.lab.residuals.fitted_laws import RATE, TRAVEL, ForceCurve
+from logger.lab.residuals.fitted_laws import RATE, TRAVEL, FittedCar, ForceCurve
 from logger.lab.residuals.unexplained import Shape
 from logger.lab.selection.detectability import DETECTABLE_SIGMA, Undetectable
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION
@@ -529,7 +529,7 @@ def diagnosis_blocks(found: LabDiagnosis, most: int | None) -> Iterator[Block]:
     """What a person reads of a diagnosis; at a terminal ``most`` so many candidates, None: all."""
     yield _tiles(found)
     yield from diagnosis_summary(found)
-    yield from bench_sections(found)
+    yield from bench_sections(found.car, found.steps[0].error)
     yield lab_words.removed_section(found.removed, found.band)
     yield from shape_sections(found)
     yield lab_words.steps_section(found.steps, found.noise_floor_error)
@@ -597,13 +597,14 @@ def car_sections(found: LabDiagnosis) -> list[Section]:
             "memory.")])] if found.car.on_bench is None else [])]
 
 
-def bench_sections(found: LabDiagnosis) -> list[Section]:
-    """What every bench draws of a part: its force over the velocity and over the travel, sample by sample."""
-    if found.car is None or (part := found.car.on_bench) is None:
+def bench_sections(car: FittedCar | None, error: float) -> list[Section]:
+    """What every bench draws of a part: its force over the velocity and over the travel, sample by sample; ``error`` is
+    that of its file."""
+    if car is None or (part := car.on_bench) is None:
         return []
     few = -(-len(part.travel_m) // MOST_DOTS)
     forces = {"measured": part.measured_n, "file unchanged": part.before_n, "refitted": part.after_n}
-    if not found.steps[0].error < 1:  # a file of unknown numbers is farther off than no force at all
+    if not error < 1:  # a file of unknown numbers is farther off than no force at all
         del forces["file unchanged"]
     return [Section("Force by velocity and by travel", [
         Curves(f"Force by {name}", f"{name} [{unit}], positive in extension", "force [N]", tuple(

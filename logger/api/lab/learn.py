@@ -9,16 +9,19 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from logger.api.lab import words as lab_words
 from logger.api.lab.bench import Bench, bench_with
-from logger.api.lab.diagnose import addition_words, shape_sections
+from logger.api.lab.diagnose import addition_words, bench_sections, shape_sections
 from logger.api.lab.question import LearnQuestion
-from logger.chart_data import Chart, Curves
+from logger.chart_data import CURVE_REACH, Chart, Curves
 from logger.files import write_text
 from logger.lab.laws.draft import Draft
 from logger.lab.laws.learn import Law, Learning, Nearest
 from logger.lab.laws.learn import learn as learn_law
 from logger.lab.laws.picture import picture
+from logger.lab.residuals.fitted_laws import BenchForces, FittedCar, fitted_car, force_by_rate
 from logger.lab.selection.add_effect import AddedEffects, add
 from logger.lab.selection.holdout import JUDGED_ON, ErrorStep
 from logger.plugins import catalogue
@@ -33,10 +36,12 @@ from logger.vehicle.uncertain import sized
 
 @dataclass(frozen=True, eq=False)
 class LearnedModel:
-    """What was learned on a bench, and the model with it, fitted on all of the runs; None where no law is learned."""
+    """What was learned on a bench, and the model with it, fitted on all of the runs; None where no law is learned;
+    ``car``: how that differs from the file."""
 
     learning: Learning
     addition: AddedEffects | None
+    car: FittedCar | None = None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -122,8 +127,10 @@ def learned(bench: Bench, notify: Notify = silent) -> LearnedModel:
             return LearnedModel(found, None)
         notify("fitting the model without and with the law")
         added = [bench.filed(one) for one in found.law.effects]
+        posterior, state = found.context.posterior, found.law.state
         return LearnedModel(found, add(bench.posterior(), bench.model.effects, [*added, found.law.one],
-                                       len(found.law.draft.effect.trials()), found.law.state))
+                                       len(found.law.draft.effect.trials()), state),
+                            fitted_car(posterior, posterior.start(bench.model.effects), state))
 
 
 def with_law(given: Bench, addition: AddedEffects, law: Path) -> tuple[Bench, AddedEffects]:
@@ -195,12 +202,29 @@ def law_blocks(learned: LearnedModel) -> Iterator[Block]:
         yield " ".join(lab_words.error_words(found.diagnosis.steps, found.diagnosis.noise_floor_error))
         return
     yield from sentences(found.law, addition)
+    if learned.car is not None and (part := learned.car.on_bench) is not None:
+        yield from bench_sections(learned.car, addition.error_before)
+        yield _by_velocity(addition, part)
     yield from law_sections(found.law, addition, picture_of(learned))
     yield Detail(lab_words.MODEL_BY_MODEL, [
         lab_words.falling(f"NRMSE on {JUDGED_ON}", _steps(found, addition), addition.noise_floor_error)])
     yield Detail("The law's file", [
         "It is an effect of your own: compare, simulate, add-effect and diagnose --effect-file read it.",
         found.law.draft.source])
+
+
+_VELOCITIES = (0.05, 0.1, 0.2, 0.4, 0.7, 1.0)
+"""Shares of the highest at which a table gives a damper's force."""
+
+
+def _by_velocity(addition: AddedEffects, part: BenchForces) -> Section:
+    """A part's force by velocity in both directions, as dampers are specified."""
+    top_mps = np.quantile(np.abs(part.rate_mps), CURVE_REACH)
+    at_mps = np.array([float(f"{share * top_mps:.2g}") for share in _VELOCITIES])
+    both_n = [force_by_rate(addition.vehicle, addition.effects, addition.errors, way * at_mps) for way in (-1, 1)]
+    return Section("Force at rest by velocity", [Table(("Velocity [m/s]", "Compression [N]", "Extension [N]"), [
+        (f"{at:g}", *(measured(float(force_n[i]), float(error_n[i])) for force_n, error_n in both_n))
+        for i, at in enumerate(at_mps)]), Hint("At the travel of rest, without friction that has a memory.")])
 
 
 def sentences(law: Law, addition: AddedEffects) -> list[str]:

@@ -6,7 +6,7 @@ the runs' motions lie, monotone between them (F. N. Fritsch and J. Butland, SIAM
 each of them counts. Beyond the motions of the runs curves stay what they are there: nothing is known of them.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -84,12 +84,7 @@ class CurveFamily(Family):
         size_n = self.tried * getattr(context.vehicle.front, self.answers) * usual
         return [self._power(usual, 2 * reach(self.reach_share), size_n),
                 *(self.free(variant, [reach(share) for share in shares], size_n)
-                  for variant, shares in _POINTS.items()), *self.more_drafts(context, reach, size_n)]
-
-    def more_drafts(self, context: LawContext, reach: Callable[[float], float], size_n: float) -> list[Draft]:
-        """Further laws; ``reach`` gives the motion by the share of the time, ``size_n`` is the force that a search
-        begins with."""
-        return []
+                  for variant, shares in _POINTS.items())]
 
     def is_straight(self, draft: Draft, found: Chosen, sigma: float) -> bool:
         if draft.variant == "power":

@@ -137,7 +137,7 @@ def _at(one: Parameter, value: float) -> Parameter:
 def _written(one: Parameter) -> str:
     """A parameter as it stands in the file."""
     null = 'float("inf")' if one.null == np.inf else repr(one.null)
-    more = "".join(f", {name}={value!r}" for name in ("default", "step", "choices", "given")
+    more = "".join(f", {name}={value!r}" for name in ("default", "step", "choices", "given", "may_end")
                    if (value := getattr(one, name)) != vars(Parameter)[name])
     return (f"Parameter({one.name!r}, start={one.start!r}, low={one.low!r}, high={one.high!r}, null={null},\n"
             f"          scale=Scale.{one.scale.name}, trials={one.trials!r}{more},\n"
@@ -222,6 +222,7 @@ class Family(ABC):
     shown_by           the drive that shows it best, as an instruction
     straight_at        the exponent at which its laws are straight lines, which are numbers of the car; None: at none
     by_axle            whether its forces may act at one axle alone
+    holds              names of effects of the list that its laws hold, which are not sought on top of them
     stands_out         whether its laws are loud at few frequencies and drafted only where those stand out of the noise:
                        a whole residual may be no louder than the noise for all that
     """
@@ -229,6 +230,7 @@ class Family(ABC):
     name: str
     title: str
     related_effects: tuple[str, ...] = ()
+    holds: tuple[str, ...] = ()
     kind: str = "ForceEffect"
     source: str = ""
     signature: str = ""
@@ -266,19 +268,27 @@ class Family(ABC):
         mm". The axle is added by the caller."""
 
 
-def through_points(function: str, names: Mapping[float, str]) -> str:
+def through_points(function: str, names: Mapping[float, str], places: str = "AT", zeros: Sequence[float] = (0.0,),
+                   more: str = "") -> str:
     """Text of a function of the parameters and of where it is: a smooth curve through points, of which parameters have
-    these ``names`` by place, and 0 at rest; beyond the points it stays what it is there."""
-    at = sorted([*names, 0.0])
-    return f"""
-AT = np.array([{', '.join(repr(one) for one in at)}])
-
-
-def {function}(p, at):
-    through = np.array([
-        {', '.join(f'p.{names[one]}' if one in names else '0.0' for one in at)}])
-    return PchipInterpolator(AT, through)(np.clip(at, AT[0], AT[-1]))
+    these ``names`` by place, and 0 at rest, or at ``zeros``; beyond the points it stays what it is there, or goes on as
+    straight as between the last two, by no less than what it takes further (``more``)."""
+    at = sorted([*names, *zeros])
+    straight = f"""
+    inside = np.clip(at, {places}[0], {places}[-1])
+    first, last = (np.maximum((through[i + 1] - through[i]) / ({places}[i + 1] - {places}[i]), {more}) for i in (0, -2))
+    return PchipInterpolator({places}, through)(inside) + np.where(at > inside, last, first) * (at - inside)
 """
+    still = f"""
+    return PchipInterpolator({places}, through)(np.clip(at, {places}[0], {places}[-1]))
+"""
+    return f"""
+{places} = np.array([{', '.join(repr(one) for one in at)}])
+
+
+def {function}(p, at{', ' * bool(more) + more}):
+    through = np.array([
+        {', '.join(f'p.{names[one]}' if one in names else '0.0' for one in at)}]){straight if more else still}"""
 
 
 def rounded(value: float, digits: int = 2) -> float:

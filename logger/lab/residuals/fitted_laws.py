@@ -1,7 +1,7 @@
 """The fitted car: by how much its numbers changed, and the force curves of its springs and dampers; of a part alone on
 its bench the forces themselves."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +9,10 @@ import numpy as np
 from logger.arrays import Array
 from logger.chart_data import CURVE_POINTS, CURVE_REACH
 from logger.lab.likelihood.posterior import Posterior, State
-from logger.vehicle.compose import Car
+from logger.vehicle.compose import Car, compose
+from logger.vehicle.effect import Chosen
+from logger.vehicle.uncertain import NumberErrors, models_off
+from logger.vehicle.vehicle import Vehicle
 
 RATE, TRAVEL = "rate", "travel"
 
@@ -81,6 +84,18 @@ def fitted_car(posterior: Posterior, stood: State, found: State) -> FittedCar:
                         for laws in (car.laws[_wheels(car)[axle]] for car in (before, after)))
             curves.append(ForceCurve(axle, motion, at, old, new))
     return FittedCar(moved, tuple(curves))
+
+
+def force_by_rate(vehicle: Vehicle, effects: Sequence[Chosen], errors: NumberErrors, rate_mps: Array
+                  ) -> tuple[Array, Array]:
+    """Force (n,) of a part at these rates (n,) and no travel, and its standard errors (n,) [N]; without friction that
+    has a memory."""
+    def force_n(vehicle: Vehicle, effects: Sequence[Chosen]) -> Array:
+        return compose(vehicle, effects).laws[0].by_rate_n(rate_mps)
+
+    there_n = force_n(vehicle, effects)
+    off_n = [force_n(*one) - there_n for one in models_off(vehicle, effects, errors)]
+    return there_n, np.sqrt(np.sum(np.square(off_n), axis=0))
 
 
 def _wheels(car: Car) -> dict[str, int]:

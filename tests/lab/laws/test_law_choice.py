@@ -87,7 +87,7 @@ class World:
             return Refusal(draft.title, "says nothing") if draft.title in nothing else None
 
         def family(name: str) -> Any:
-            found = SimpleNamespace(name=name, title=name, stands_out=False, related_effects=tuple(related))
+            found = SimpleNamespace(name=name, title=name, stands_out=False, related_effects=tuple(related), holds=())
             found.drafts = lambda _context: [SimpleNamespace(
                 effect=NamedEffect(LEARNED + name), name=LEARNED + name, key=(name, ""), title=name, family=found)]
             return found

@@ -27,7 +27,7 @@ NAMES: dict[str, frozenset[str]] = {
     BY_TIRE: frozenset({"tire_force"}),
     FRICTION: frozenset({"hysteresis"}),
     RUBBER: frozenset({"maxwell_element"}),
-    PLAY: frozenset({"damper_backlash", "sliding_behind_spring"}),
+    PLAY: frozenset({"damper_backlash"}),
     HEAT: frozenset({"damper_heat"}),
     MASS: frozenset({"hung_mass"}),
     ON_BODY: frozenset({"occupant"}),
