@@ -15,7 +15,7 @@ from logger.api.lab import words as lab_words
 from logger.api.lab.bench import Bench, bench_with
 from logger.api.lab.diagnose import addition_words, bench_sections, shape_sections
 from logger.api.lab.question import LearnQuestion
-from logger.chart_data import CURVE_REACH, Chart, Curves
+from logger.chart_data import CURVE_POINTS, CURVE_REACH, Chart, Curves, Line
 from logger.files import write_text
 from logger.lab.laws.draft import Draft
 from logger.lab.laws.learn import Law, Learning, Nearest
@@ -221,10 +221,16 @@ def _by_velocity(addition: AddedEffects, part: BenchForces) -> Section:
     """A part's force by velocity in both directions, as dampers are specified."""
     top_mps = np.quantile(np.abs(part.rate_mps), CURVE_REACH)
     at_mps = np.array([float(f"{share * top_mps:.2g}") for share in _VELOCITIES])
-    both_n = [force_by_rate(addition.vehicle, addition.effects, addition.errors, way * at_mps) for way in (-1, 1)]
-    return Section("Force at rest by velocity", [Table(("Velocity [m/s]", "Compression [N]", "Extension [N]"), [
-        (f"{at:g}", *(measured(float(force_n[i]), float(error_n[i])) for force_n, error_n in both_n))
-        for i, at in enumerate(at_mps)]), Hint("At the travel of rest, without friction that has a memory.")])
+    by_rate = partial(force_by_rate, addition.vehicle, addition.effects, addition.errors)
+    both_n = [by_rate(way * at_mps) for way in (-1, 1)]
+    drawn_mps = np.linspace(-top_mps, top_mps, CURVE_POINTS)
+    drawn = Line("with the law", drawn_mps, *by_rate(drawn_mps))
+    return Section("Force at rest by velocity", [
+        Curves("Force at rest by velocity", "velocity [m/s], positive in extension", "force [N]", (drawn,)),
+        Table(("Velocity [m/s]", "Compression [N]", "Extension [N]"), [
+            (f"{at:g}", *(measured(float(force_n[i]), float(error_n[i])) for force_n, error_n in both_n))
+            for i, at in enumerate(at_mps)]),
+        Hint("At the travel of rest, without friction that has a memory. Band: one standard error either way.")])
 
 
 def sentences(law: Law, addition: AddedEffects) -> list[str]:

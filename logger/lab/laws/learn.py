@@ -6,9 +6,8 @@ families of laws are searched as effects are, by the same screening, fits and ev
 on top of the known ones: every number counts, so that a curve has to be worth its points. Known effects are sought on
 top of the better of the two, where it leaves something. Where known effects explain everything, a law replaces them
 only by decisive evidence. A law whose numbers mean nothing is refused, and the next one is tried; one in whose place a
-known effect explains more is refused for that effect. Of a part on its bench laws are tried as soon as two known
-effects leave something, and known forces come before what changes any force, as a sensor does: that imitates some of
-any law.
+known effect explains more is refused for that effect. Of a part on its bench known forces come before what changes any
+force, as a sensor does: that imitates some of any law.
 
 A law that was fitted may say nothing. Problem: what no known effect explains, some law always explains a little better
 than others. The evidence counts its numbers; it does not ask whether they mean anything. Solution: a law that was
@@ -24,12 +23,11 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from logger.bounds import SURE_SIGMA
-from logger.lab.diagnosis import LabDiagnosis, assess, begin_search, exceeds_noise, search_to_the_last
+from logger.lab.diagnosis import LabDiagnosis, assess, exceeds_noise, search_to_the_last
 from logger.lab.laws.draft import LEARNED, Draft, Family, LawContext
 from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.standard_errors import deviations_from_null, standard_errors
 from logger.lab.selection.evidence import INDISTINGUISHABLE, min_gain
-from logger.lab.selection.filter_without_delay import below_filter_without_delay
 from logger.lab.selection.screening import Baseline
 from logger.lab.selection.stepwise import UNTRIED, Fitted, Search, Selection, is_outside_data
 from logger.vehicle.effect import Chosen, Effect, ForceEffect
@@ -196,10 +194,6 @@ def learn(posterior: Posterior, effects: Mapping[str, Effect], families: Mapping
 
     ValueError where the vehicle lacks what an effect needs.
     """
-    if posterior.vehicle.is_part:
-        begun = _few_effects(posterior, effects, present, progress)
-        if begun is not None and (law := FamilySearch(*begun, families, known).best()) is not None:
-            return _learned(begun[1], law)
     last = {name: one for name, one in known.items() if one.sought_last and name not in effects}
     searched = search_to_the_last(posterior, effects, present, progress, last)
     laws = FamilySearch(searched.search, selection := searched.selection, families, known)
@@ -208,35 +202,12 @@ def learn(posterior: Posterior, effects: Mapping[str, Effect], families: Mapping
         search, selection = laws.with_better_known()
         diagnosis = assess(searched.posterior, {**effects, **{one.name: one for one in search.effects}}, present,
                            search, selection)
-    if law is not None:
-        return _learned(selection, law)
     context = LawContext(selection.before.posterior, selection.before.state)
+    if law is not None:
+        return Learning(law, context, tuple(selection.gains), selection.now.hold_out.error,
+                        exceeds_noise(selection.now), None)
     return Learning(None, context, diagnosis.verdict, selection.now.hold_out.error, diagnosis.unexplained, diagnosis,
                     laws.refusal_to_report())
-
-
-def _learned(selection: Selection, law: Law) -> Learning:
-    """A law that was found after a search among known effects."""
-    context = LawContext(selection.before.posterior, selection.before.state)
-    return Learning(law, context, tuple(selection.gains), selection.now.hold_out.error, exceeds_noise(selection.now),
-                    None)
-
-
-_FEW = 2
-"""So many known effects of a part are a better answer than a law with many numbers: of more, each found on what those
-before it could not explain, some stand for others (a judgement)."""
-
-
-def _few_effects(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen], progress: Progress
-                 ) -> tuple[Search, Selection] | None:
-    """A search among known effects of a part alone on its bench that ends with ``_FEW``; None where these leave nothing
-    or the records have to be searched below a filter."""
-    search, before = begin_search(posterior, effects, present, progress)
-    brief = replace(search, effort=replace(search.effort, effects=_FEW, beginnings=0))
-    found = brief.go_on(Selection(before, before, {}, {}, UNTRIED, ()))
-    if found.now.explanation == 0 or below_filter_without_delay(search, found) is not None:
-        return None
-    return replace(search, _rivals={}), found
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,13 +12,14 @@ import pytest
 from logger.api.lab.bench import bench_with
 from logger.api.lab.question import CompareQuestion
 from logger.lab.diagnosis import refit
-from logger.lab.residuals.fitted_laws import RATE, fitted_car
+from logger.lab.residuals.fitted_laws import RATE, fitted_car, force_by_rate
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_model
 from logger.vehicle.compose import compose
 from logger.vehicle.effect import Chosen, chosen
 from logger.vehicle.effects.damper_blow_off import EFFECT as BLOW_OFF
 from logger.vehicle.effects.roll import EFFECT as ROLL
+from logger.vehicle.uncertain import NumberErrors
 
 from ...support.drives.part_bench import RATE_HZ, moved, write_bench
 
@@ -63,3 +64,16 @@ def test_of_a_part_the_force_is_shown_over_its_motion_sample_by_sample(tmp_path:
     of = np.stack([part.travel_m, part.rate_mps, np.ones(len(part.rate_mps))], axis=1)
     for force, damping in ((part.before_n, 450.0), (part.after_n, 900.0), (part.measured_n, 900.0)):
         assert np.linalg.lstsq(of, force)[0][:2] == pytest.approx([2000.0, damping], rel=0.02)
+
+
+def test_errors_of_damping_and_knee_are_those_of_the_force() -> None:
+    """c v up to the knee w, c (w + s (v - w)) beyond: the derivative by w is c (1 - s)."""
+    vehicle = read_model(vehicle_file("rav4-2009")).vehicle
+    damping, at_mps = vehicle.front.suspension_damping_n_s_per_m, np.array([-0.3, -0.05, 0.05, 0.3])
+    knee = chosen(BLOW_OFF, {"knee_velocity_m_per_s": 0.1, "slope_ratio": 0.4})
+    force_n, error_n = force_by_rate(vehicle, [knee], NumberErrors({
+        "front.suspension_damping_n_s_per_m": 0.001 * damping, "damper_blow_off.knee_velocity_m_per_s": 1e-4},
+        ((), (0.0,))), at_mps)
+    assert force_n == pytest.approx(damping * np.array([-0.18, -0.05, 0.05, 0.18]))
+    beyond, before = 1e-4 * damping * np.hypot(1.8, 0.6), 5e-5 * damping
+    assert error_n == pytest.approx([beyond, before, before, beyond], rel=0.01)
