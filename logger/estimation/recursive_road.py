@@ -31,7 +31,7 @@ from logger.estimation.quantisation import (
 )
 from logger.estimation.road_solver import Block, Solution
 from logger.estimation.road_spectrum import COMMON_ROAD, RoadSpectrum, learned
-from logger.estimation.roughness import RoadLevels, mean_resolved
+from logger.estimation.roughness import RoadLevels, mean_resolved, resolved_shares
 from logger.estimation.scored_variances import ScoredVariances
 from logger.estimation.sensor_noise import (
     NoiseBelief,
@@ -322,8 +322,8 @@ class FollowedRoad:
         now = spectrum
         if learns or before is None:
             resolved = mean_resolved(gain, (local * ratio)[seen > 0])
-            # A lone obstacle is no level: an innovation counts with at most some expected deviations.
-            most = UNUSUAL_SIGMA * np.sqrt(2 * float(resolved.sum()) / block.count)
+            # A lone obstacle is no level: an innovation counts with at most some deviations that are expected there.
+            most = UNUSUAL_SIGMA * np.sqrt(resolved_shares(np.log(local * ratio), gain, seen, None)[0])
             white = np.clip(solution.innovations / np.sqrt(local), -most, most)
             power = np.abs(np.fft.rfft(white)) ** 2 / block.count
             # The level goes with the roughness along the block: two that follow the same slope would overshoot.

@@ -1,5 +1,6 @@
 """Single bumps, stretches of other roughness and misplaced windows: drives of the simulation in time."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -20,6 +21,7 @@ from logger.vehicle.models import structure_of
 from logger.vehicle.structure import body_point
 
 from ..support.drives.linear_drive import drive
+from ..support.drives.measured import Accelerometer, iso_road, steady_drive
 from ..support.slow import release, slow
 
 FINE, COARSE = Sensor(0.05, 0.0), Sensor(0.1, 0.613)
@@ -241,3 +243,23 @@ def test_the_ride_of_roads_that_change_is_not_taken_for_a_harder_one() -> None:
     assert value.mean() == pytest.approx(true.mean(), rel=0.03)
     assert 0.6 < np.mean(off < 1) < 0.8
     assert np.mean(off < 2) > 0.92
+
+
+@pytest.mark.slow
+def test_stretches_that_steps_hide_do_not_change_the_waviness_of_the_others() -> None:
+    """Three drives; two quarters of each road are so smooth that steps of 2.45 m/s2 show next to nothing of them."""
+    found: list[float] = []
+    for seed in range(3):
+        even = iso_road(2.5, 1200.0, seed + 5)
+        gain = np.repeat(np.exp([0.75, -1.0, 1.25, -0.5]), len(even.elevation_m) // 4)
+        slope = np.diff(even.elevation_m, append=even.elevation_m[0]) * gain
+        road = replace(even, elevation_m=np.cumsum(slope - slope.mean()), gain=gain)
+        ride = steady_drive(read_vehicle(vehicle_file("rav4-2009")), road, 18.0, 16.0)
+        reading, _ = Accelerometer("8 g", 0.15, 2.45).read(ride.accel_mps2, np.random.default_rng(seed))
+        estimator = RoadEstimator(LinearCar(RAV4, body_point(RAV4)), Sensor(0.15, 2.45), WINDOW_M)
+        nothing = np.zeros(len(reading))
+        for part in np.array_split(np.arange(len(reading)), 20):
+            estimator.push(reading[part], nothing[part] == 0, nothing[part], (ride.place_m - ride.place_m[0])[part])
+            found.append(estimator._road.level_at(0, 2)[0].waviness)
+    print(f"waviness {np.mean(found):.3f}, right 2")
+    assert np.mean(found) == pytest.approx(2.0, abs=0.08)
