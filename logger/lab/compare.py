@@ -135,13 +135,18 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
                          (as_filed(plain.error, posterior.tolerance),
                           ErrorStep(REFITTED, cross_validate(linear).error)),
                          floor_error(posterior, sensor_noise_with_rounding(posterior, state)),
-                         removed, _tests(refitted, removed, plain), force_gain(linear))
+                         removed, _tests(refitted, removed, runs.predict(car)), force_gain(linear))
 
 
-def _tests(refitted: Standing, removed: Removed, plain: Standing) -> ResidualTestResults:
-    """Tests of the residuals without the sensors' drift."""
+def _tests(refitted: Standing, removed: Removed, as_recorded: Sequence[Array]) -> ResidualTestResults:
+    """Tests of the residuals without the sensors' drift.
+
+    as_recorded    predictions (n,) of the refitted model at the recorded distances, per run
+    """
     residuals, where = refitted.residuals, refitted.where
+    unmoved = replace(residuals, predictions=[
+        run.main(one) for run, one in zip(residuals.runs, as_recorded, strict=True)])
     if removed.drifting_sensors:
         residuals = replace(residuals, predictions=removed.with_drifts(residuals.predictions))
         where = breakdown(residuals)
-    return run_residual_tests(ResidualEvidence(residuals, where, plain.residuals))
+    return run_residual_tests(ResidualEvidence(residuals, where, unmoved))

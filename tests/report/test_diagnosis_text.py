@@ -10,6 +10,7 @@ import pytest
 
 from logger.api.lab.diagnose import diagnosis_blocks, diagnosis_json, diagnosis_summary, looks_like, table, untested
 from logger.api.lab.question import DiagnoseQuestion
+from logger.api.lab.words import force_words
 from logger.lab.diagnosis import ALREADY_PRESENT, CandidateEffect, LabDiagnosis
 from logger.lab.likelihood.noise_floor import NoiseLevel, SignalErrors
 from logger.lab.residual_tests import run_residual_tests
@@ -110,6 +111,11 @@ def test_an_effect_that_leaves_another_signal_as_it_was_may_only_imitate() -> No
     assert missing.startswith("dry_friction explains part of the residual, or imitates something else")
     assert where.endswith("sign and filter: if they are right, dry_friction may be an imitation.")
     assert left.endswith("is 241 times the sensor's noise. Beyond that noise it is 81% of the power of wheel.")
+
+
+def test_how_much_larger_forces_should_be_is_said_in_plain_numbers() -> None:
+    said = [force_words(gain)[0].split(" would")[0] for gain in (-0.9, 3.2, 934.0)]
+    assert said == ["Forces of the opposite sign", "Forces several times as large", "Forces about 900 times as large"]
 
 
 def test_what_was_removed_comes_first_where_it_is_most_of_the_residual() -> None:

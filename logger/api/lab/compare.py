@@ -200,7 +200,8 @@ def headline(found: LabComparison) -> list[str]:
         lines.append(f"{refit} lowers it to {after:.3f} and removes {1 - (after / before)**2:.0%} of the residual's "
                      "power.")
     else:
-        lines.append(f"{refit} leaves it at {after:.3f}: small errors in the parameters are not the cause.")
+        lines.append(f"{refit} {'raises it to' if after > before / _HELPS else 'leaves it at'} {after:.3f}: small "
+                     "errors in the parameters are not the cause.")
     lines += lab_words.error_words(found.steps, found.floor)
     lines += signal_errors({name: (error, refitted.signals[name]) for name, error in plain.signals.items()},
                            "{}, refitted {}")
@@ -231,8 +232,10 @@ def conclusion(found: LabComparison) -> str:
     """The answer: whether the model lacks something."""
     on_rig = are_on_rig(found.refitted.residuals.runs)
     if _explains_nothing(found):
-        return ("The model explains next to nothing of what was measured, even with its parameters refitted. Do both "
-                "files of the run belong together? Are signs and units right? If they are, something large is missing.")
+        which, even = (("model", ", even with its parameters refitted") if found.plain.error > POOR_ERROR
+                       else ("refitted model", ""))
+        return (f"The {which} explains next to nothing of what was measured{even}. Do both files of the run belong "
+                "together? Are signs and units right? If they are, something large is missing.")
     if found.missing and not any(test.road for test in found.tests_found):
         return ("The model fits, but only with parameters far from those of the vehicle's file. Either the file is "
                 "wrong, or these parameters imitate a missing effect.")
@@ -346,7 +349,8 @@ def comparison_blocks(found: LabComparison) -> Iterator[Block]:
     yield from _by_part(found)
     yield _places(found.refitted)
     yield forces_section(found.tests.forces)
-    yield _alignment(found)
+    if not are_on_rig(residuals.runs):
+        yield _alignment(found)
     yield _tests(found)
     yield _numbers(found)
     yield Hint(f"{found.vehicle} on {counted(len(residuals.runs), 'run')}, {seconds:.0f} s.")
@@ -446,8 +450,8 @@ def _alignment(found: LabComparison) -> Detail:
              for index, run in enumerate(runs[:SHOWN_ROWS]) if (of := windows.run == index).any()]
     drawn = Curves("Lead of the model over the measurement", "distance into the run [m]", "lead [ms]", tuple(lines),
                    (0.0, "no lead"))
-    return Detail("Alignment", [*([drawn] if lines and not are_on_rig(runs) else []), Hint(
-        "A constant lead: a clock or a position is off. A growing lead: the speed is wrong. Shown before the refit.")])
+    return Detail("Alignment", [*([drawn] if lines else []), Hint(
+        "A constant lead: a clock or a position is off. A growing lead: the speed is wrong. At recorded distances.")])
 
 
 # --- tables ---
@@ -456,7 +460,7 @@ def _alignment(found: LabComparison) -> Detail:
 def _by_part(found: LabComparison) -> Iterator[Block]:
     plain, refitted = found.plain.where, found.refitted.where
     yield _table("By band", "Hz", plain.frequency, refitted.frequency)
-    yield Hint("Share: of the residual's power. Unchanged: with the vehicle file as it is.")
+    yield Hint("Share: of the residual's power. Unchanged: before any fit.")
     yield _table("By speed", "m/s", plain.speed, refitted.speed)
     yield _table("By amplitude of the motion", found.plain.residuals.unit, plain.amplitude, refitted.amplitude)
 

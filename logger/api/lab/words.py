@@ -192,7 +192,8 @@ def force_words(gain: float | None) -> list[str]:
     """That the forces that drive a rig are not what they say."""
     if gain is None:
         return []
-    which = "of the opposite sign" if gain < 0 else f"about {gain:.1g} times as large"
+    which = ("of the opposite sign" if gain < 0 else "several times as large" if gain < 10 else
+             f"about {float(f'{gain:.1g}'):.0f} times as large")
     return [f"Forces {which} would explain most of the residual of the refitted model: are sign and unit of "
             "excitation.csv right, and what run.yaml says they act on?"]
 

@@ -68,9 +68,9 @@ class SensorBandwidth(SensorEffect):
     def delaying_trials(self, seen: Misalignment) -> list[list[dict[str, float]]]:
         """Filters of each order, from high cut-offs to low ones: what order and cut-off do differs by little more than
         the delay that goes with them, so that no fit leads from one order to another."""
-        if not seen.rate_hz:
-            return []
         highest_hz = _HIGHEST_OF_RATE * seen.rate_hz
+        if highest_hz < _LOWEST_HZ:  # or no rate is known
+            return []
         count = round(np.log(highest_hz / _LOWEST_HZ) / np.log(_CUTOFF_RATIO))
         cutoffs_hz = sorted([*np.geomspace(_LOWEST_HZ, highest_hz, count + 1), *(seen.low_pass or ())[:1]])[::-1]
         return [[{"cutoff_hz": float(cutoff_hz), "order": float(order), "sampled_hz": sampled_hz}

@@ -44,6 +44,12 @@ def slight() -> Baseline:
     return fitted(posterior_of(secret_runs([hidden("sensor_offset", offset_m=0.2)], noise_mps2=0.5)))
 
 
+@pytest.mark.parametrize(("rate_hz", "first_hz"), [(0.0, None), (10.0, None), (100.0, 45.0)])
+def test_no_slow_sensor_is_tried_that_ten_samples_a_second_cannot_show(rate_hz: float, first_hz: float | None) -> None:
+    kinds = EFFECTS["sensor_bandwidth"].delaying_trials(replace(STILL, rate_hz=rate_hz))
+    assert [*{kind[0]["cutoff_hz"] for kind in kinds}] == ([] if first_hz is None else [pytest.approx(first_hz)])
+
+
 @pytest.mark.parametrize("name", ["sensor_offset", "tire_damping", "payload"])
 def test_a_promise_is_what_dense_least_squares_gain_by_the_change(slight: Baseline, name: str) -> None:
     dense = Dense(slight.linear)
