@@ -933,6 +933,16 @@ def test_a_force_that_is_not_what_it_says_is_said(
     assert words in found if words else "Forces" not in found
 
 
+def test_what_forces_drive_the_other_way_is_upside_down_or_they_are(tmp_path: Path) -> None:
+    """On a base that moves it less."""
+    bench, push, base = Bench(2.5, 900.0, 12.0, 0.0, 0.4, 5400.0), noise(20.0, 2.0, 2), noise(15.0, 1e-4, 1)
+    (tmp_path / "bench.yaml").write_text(bench.yaml)
+    record = {"accel_z_mps2": bench.moved(base, push, NOTHING)["accel_z_mps2"]}
+    run = written(tmp_path / "run", record, {"elevation_m": base(TIME_S), "force_n": -push(TIME_S)}, BODY)
+    with pytest.raises(BadInput, match="found them upside down, or forces of the opposite sign: with the sign changed"):
+        main(["compare", "--vehicle", str(tmp_path / "bench.yaml"), str(run)])
+
+
 def test_a_guess_of_its_spring_makes_no_record_early_after_the_refit(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bench = Bench(2.5, 900.0, 12.0, guide_n=1.0)

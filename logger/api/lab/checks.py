@@ -212,8 +212,10 @@ def _other_ways_up(followed: _Followed, rig: LikeliestRig | None) -> Iterator[st
     for (run, _), around, below, known in zip(followed.pairs, followed.around, followed.below_at_hand, upright,
                                               strict=True):
         if not known and (below.is_upside_down or (around.is_upside_down and below.turned > below.correlation)):
-            yield (f"{run.name}: expected {run.facts.main.name} up positive, found them upside down: with the sign "
-                   f"changed they follow the model (correlation {max(around.turned, below.turned):.2f})")
+            pushed = isinstance(run.track, Excitation) and bool(run.track.forces)
+            yield (f"{run.name}: expected {run.facts.main.name} up positive, found them upside down"
+                   f"{', or forces of the opposite sign' * pushed}: with the sign changed they follow the model "
+                   f"(correlation {max(around.turned, below.turned):.2f})")
 
 
 def _other_units(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
