@@ -51,7 +51,7 @@ def measured(value: float, error: float | None) -> str:
     if error is None or not isfinite(error) or not error > 0:
         return f"{value:.3g}".replace("e+0", "e")
     decimals = 1 - floor(log10(error)) - (error / 10.0 ** floor(log10(error)) >= 2)
-    size = max(abs(value), error)
+    size = round(max(abs(value), error), decimals)
     if 1e-3 <= size < 1e6:
         return " ± ".join(f"{round(one, decimals):.{max(decimals, 0)}f}" for one in (value, error))
     power = floor(log10(size))

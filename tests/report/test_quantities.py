@@ -15,6 +15,7 @@ from logger.vehicle.effect import chosen
     (84.7, 3.9, "85 ± 4"), (84.7, 1.44, "84.7 ± 1.4"), (2546650.3, 47294.2, "2.55e6 ± 0.05e6"),
     (0.4021, 0.0049, "0.402 ± 0.005"), (23088.0, 230.0, "23100 ± 200"), (1.234e-5, 2e-7, "1.23e-5 ± 0.02e-5"),
     (1.2345, None, "1.23"), (5.0, float("inf"), "5"), (0.0, 0.0, "0"), (2e-6, 2e-4, "0 ± 2e-4"),
+    (0.99e-3, 0.6e-3, "0.0010 ± 0.0006"), (9.99e5, 2e5, "1.0e6 ± 0.2e6"),
 ])
 def test_a_value_has_the_digits_that_it_deserves(value: float, error: float | None, words: str) -> None:
     assert measured(value, error) == words
