@@ -116,6 +116,7 @@ def test_an_effect_that_leaves_another_signal_as_it_was_may_only_imitate() -> No
 def test_how_much_larger_forces_should_be_is_said_in_plain_numbers() -> None:
     said = [force_words(gain)[0].split(" would")[0] for gain in (-0.9, 3.2, 934.0)]
     assert said == ["Forces of the opposite sign", "Forces several times as large", "Forces about 900 times as large"]
+    assert diagnosis_json(replace(FOUND, force_gain=-0.9))["force_gain"] == -0.9
 
 
 def test_what_was_removed_comes_first_where_it_is_most_of_the_residual() -> None:

@@ -293,7 +293,7 @@ def comparison_json(found: LabComparison) -> dict[str, Any]:
         **lab_words.errors_json(found.steps, found.floor),
         "refitted": {**_standing_json(found.refitted), "error": found.steps[-1].error,
                      "shifts": dict(found.moves), "shifted_far": list(found.far)},
-        "repeats": None if found.repeats is None else {
+        "force_gain": found.force_gain, "repeats": None if found.repeats is None else {
             "runs": list(found.repeats.names), "deviation_mps2": found.repeats.deviation_mps2},
         "residual_tests": [
             {"name": test.name, "found": test in found.tests_found, "value": known(test.value), "unit": test.unit,

@@ -482,6 +482,7 @@ def diagnosis_json(found: LabDiagnosis) -> dict[str, Any]:
         "signals": {name: {"baseline_error": one.before, "final_error": one.after, "noise_floor_error": one.noise_floor}
                     for name, one in found.signals.items()},
         "signals_in_conflict": dict(found.signals_off), "contradicted_by": list(found.contradicted_by),
+        "force_gain": found.force_gain,
         "explained_power": {"refitted": found.explained[0], "final": found.explained[1],
                             "best_linear": found.best_linear},
         "tolerance": found.tolerance, "coloured_noise": found.coloured,
