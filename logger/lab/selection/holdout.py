@@ -58,8 +58,10 @@ class HoldOut:
         return self._left_of(without) < most_of(1.0)
 
     def is_worse_than(self, without: HoldOut) -> bool:
-        """Whether the error is larger than that of a smaller model by more than a rounding."""
-        return self._left_of(without) > (1 + AS_PRINTED)**2
+        """Whether the error, which is of the first signal, or what is left of all is larger than that of a smaller
+        model by more than a rounding."""
+        return max(self.error / without.error if without.error else 1.0,
+                   self._left_of(without)**0.5) > 1 + AS_PRINTED
 
     def _left_of(self, without: HoldOut) -> float:
         """Share that is left of the power that a smaller model leaves: the mean of the signals, by what that leaves of

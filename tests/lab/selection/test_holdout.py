@@ -60,6 +60,7 @@ def test_most_is_explained_of_all_signals_each_by_what_is_left_of_it_beyond_its_
     assert not errors(0.02, 0.90, 0.003).explains_most_beyond(errors(0.65, 0.96, 0.003))  # the wheel moves otherwise
     assert errors(0.02, 0.40, 0.399).explains_most_beyond(errors(0.65, 0.41, 0.399))  # what it left of it was noise
     assert errors(0.10, 0.20, 0.003).is_worse_than(errors(0.11, 0.10, 0.003))
+    assert errors(0.34, 0.02, 0.003).is_worse_than(errors(0.28, 0.50, 0.003))  # that of the first signal rises
 
 
 # --- against fits ---
