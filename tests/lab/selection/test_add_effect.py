@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from logger.api.lab.bench import tolerance_of
 from logger.bounds import SURE_SIGMA
 from logger.lab.likelihood.map_fit import align, fit, fit_to_the_end
 from logger.lab.likelihood.priors import Tolerance
@@ -145,7 +144,7 @@ def test_what_numbers_of_a_file_known_to_a_fifth_do_as_well_is_no_effect() -> No
     runs, tires = secret_runs(car=car_off_by(0.06, seed=3), lasts_s=12.0, rougher=2.0), [hidden("tire_damping")]
     found = add(posterior_of(runs, tolerance=Tolerance()), [], tires)
     assert found.tolerance == pytest.approx(0.2) and not found.helps
-    held = add(posterior_of(runs, tolerance=tolerance_of(0.04)), [], tires)
+    held = add(posterior_of(runs, tolerance=Tolerance(numbers=0.04 / Tolerance.band)), [], tires)
     assert held.tolerance == pytest.approx(0.04) and held.helps
 
 

@@ -47,7 +47,7 @@ def test_an_effect_is_found_though_the_file_is_off_by_a_factor_of_two(
         assert one.standard_errors[number] < 0.1 * truth
         assert "starting points led to this result" in " ".join(str(found).split())
         assert found.steps[-1][1] < 0.2 * found.steps[1][1]
-        assert np.isfinite([error for _, error in found.steps]).all()
+        assert np.isfinite([one.error for one in found.steps]).all()
 
 
 @pytest.mark.slow
