@@ -132,7 +132,7 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
                   for name, value in before.values.items() if value}
     return LabComparison(vehicle.name, tuple(effects), plain, refitted, moves,
                          tuple(posterior.prior.beyond_tolerance(state.logs, errors.covariance)),
-                         (as_filed(plain.error, posterior.tolerance),
+                         (ErrorStep(as_filed(posterior.tolerance), plain.error),
                           ErrorStep(REFITTED, cross_validate(linear).error)),
                          floor_error(posterior, sensor_noise_with_rounding(posterior, state)),
                          removed, _tests(refitted, removed, runs.predict(car)), force_gain(linear))

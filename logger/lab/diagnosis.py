@@ -363,7 +363,7 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
         ends=starts.ends, not_searched=tuple(starts.not_tried),
         as_moved=effect_as_moved(after, [one for one in tried if one.name not in state.names], left_open)
         if moved or beyond else None,
-        steps=_steps(selection, as_filed(posterior.error(nominal), posterior.tolerance)),
+        steps=_steps(selection, ErrorStep(as_filed(posterior.tolerance), posterior.error(nominal))),
         effects=errors.effects,
         undetectable=hidden, shape=shape if excess > UNEXPLAINED else None, coloured=colour is not None,
         removed=removed, band=compared_band(fine.runs.runs), signals=signal_errors_of(fine, baseline, state),

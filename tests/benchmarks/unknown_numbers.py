@@ -111,7 +111,7 @@ def rig(folder: Path, words: str, seed: int) -> tuple[tuple[str, ...], tuple[str
         return float(value * factor ** rng.uniform(-1, 1))
 
     drawn = Rig(near(2.5, 1.25), near(1.0, 1.25), near(900, 1.25), near(7.5, 1.25), near(6000, 1.25),
-              tire_damper=near(38, 1.25), **({hidden: near(size, 1.5)} if hidden else {}))
+                tire_damper=near(38, 1.25), **({hidden: near(size, 1.5)} if hidden else {}))
     vehicle = folder / "rig.yaml"
     vehicle.write_text(
         f"name: bench\nmodel: quarter_car\nsprung_mass_kg: {drawn.body_kg * 1.01} +- 2%\nfront:\n"

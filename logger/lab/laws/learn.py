@@ -304,10 +304,11 @@ class FamilySearch:
         leaves_something = exceeds_noise if held else self._leaves_something
         if not leaves_something(found.now) or not self._leaves_something(self.selection.now):
             return found
-        forces = [one for one in self._known_forces if one.name not in held]
+        known = self._known_forces
+        forces = [one for one in known if one.name not in held]
         search = replace(self.search, effects=[*forces, law], _promising=set(), _rivals=dict(found.rivals))
         whole = search.go_on(found)
-        others = [one for one in self.search.effects if one not in self._known_forces]
+        others = [one for one in self.search.effects if one not in known]
         if others and exceeds_noise(whole.now):
             search = replace(search, effects=[*search.effects, *others], _rivals=dict(whole.rivals))
             tried = search.round(whole.now, others, beside=whole.last) if whole.last.on is whole.now else None

@@ -184,7 +184,7 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
         excess=excess_over_noise(posterior, state, FALSE_ALARM),
         held_out_gain=unseen_before.deviance - unseen_after.deviance,
         band=compared_band(posterior.runs.runs), signals=signal_errors_of(posterior, before.state, state),
-        tolerance=posterior.tolerance.share, filed=as_filed(0.0, posterior.tolerance).words)
+        tolerance=posterior.tolerance.share, filed=as_filed(posterior.tolerance))
 
 
 def _fit_with_effects(posterior: Posterior, before: LinearModel, refitted: tuple[Chosen, ...],

@@ -165,9 +165,9 @@ class ErrorStep(NamedTuple):
         return self.error**2 + self.others
 
 
-def as_filed(error: float, tolerance: Tolerance) -> ErrorStep:
-    """The model before any fit."""
-    return ErrorStep(AS_GUESSED if tolerance.guessed else AS_FILED, error)
+def as_filed(tolerance: Tolerance) -> str:
+    """What is said of the model before any fit."""
+    return AS_GUESSED if tolerance.guessed else AS_FILED
 
 
 def rising(steps: Sequence[ErrorStep]) -> list[str]:
