@@ -7,7 +7,6 @@ the World Bank's Technical Paper 46 ends at 24 m/km; 100 is said to be doubtful 
 with a word. Hills and slopes do not count: the IRI of an even slope is 0.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 from math import ceil, floor
@@ -18,7 +17,6 @@ import numpy.typing as npt
 from logger.arrays import Array
 from logger.bounds import EVEN_SAMPLES
 from logger.dsp.filters import BlockFilter
-from logger.dsp.fixed_point import FixedFilter
 from logger.roads.iso8608 import CLASS_GD_N0_CM3, iri_from_gd_n0
 from logger.units import FOOT_M, INCH_PER_MILE_M_PER_KM, KMH_MPS, KNOT_MPS, MILE_M, MPH_MPS
 from logger.vehicle.linear_car import frequency_response
@@ -58,58 +56,6 @@ def golden_car_sections(spacing_m: float) -> Array:
     return np.array([[1.0, -1.0, 0.0, *denominators[0]], [*summed[:3], *denominators[1]]])
 
 
-class GoldenCarFilter:
-    """Elevations in, rectified slopes |z_s' - z_u'| out; any split of a profile gives the same bits.
-
-    Problem: the IRI drives a quarter car at 80 km/h over a profile, step by step and exactly (a straight line between
-    samples is a constant slope over a step), and a stream must give the same numbers as the whole profile at once.
-
-    Solution: driven by the road's slope, the suspension's slope z_s' - z_u' is -(kt / mu) s^2 / D(s), D the
-    characteristic polynomial with two pairs of complex poles p. Its response to a slope that is held over a step has a
-    closed form,
-
-        H(z) = (1 - 1/z) sum over p of r q / (1 - q / z),   q = exp(p dx / V),   r = -(kt / mu) p / product of (p -
-          others),
-
-    the value at the end of a step coming with the slope of that step. The residues r sum to zero, which leaves a
-    numerator of second order beside the factor 1 - 1/z: two second-order sections, exact for the profile as it is
-    sampled. That factor also makes a straight grade exactly smooth, which the printed coefficients of World Bank
-    Technical Paper 46 do not. At rest on a constant slope is the start that ASTM E1926 asks for (states: slope, slope,
-    0, 0).
-
-    spacing_m      distance between elevations [m], above 0 and at most 300 mm (else ValueError)
-    make_filter    what runs the sections: floating point, or the integers of ``logger.dsp.fixed_point``
-
-    Value i belongs to the end of the step from elevation i to i + 1. The tire's average takes the slope to the
-    elevation 250 mm ahead, so values come that much later; the first ones come once 11 m are known.
-    """
-
-    def __init__(self, spacing_m: float,
-                 make_filter: Callable[[Array], BlockFilter | FixedFilter] = BlockFilter) -> None:
-        self._filter = make_filter(golden_car_sections(spacing_m))
-        self._spacing_m = spacing_m
-        self._base = max(1, int(TIRE_BASE_M / spacing_m + 0.5))
-        self._start = int(START_M / spacing_m + 0.5)
-        self._started = False
-        self._known = np.empty(0)
-
-    def push(self, elevation_m: npt.ArrayLike) -> Array:
-        """The rectified slopes [m/m] that the next elevations (n,) [m] make known. ValueError if one is not finite."""
-        fresh = np.asarray(elevation_m, dtype=float)
-        if fresh.ndim != 1 or not np.isfinite(fresh).all():
-            raise ValueError("expected a row of finite elevations")
-        known = np.concatenate([self._known, fresh])
-        if not self._started:
-            if len(known) <= self._start:
-                self._known = known
-                return np.empty(0)
-            self._filter.reset((known[self._start] - known[0]) / (self._start * self._spacing_m))
-            self._started = True
-        self._known = known[-self._base:]
-        slope = (known[self._base:] - known[:-self._base]) / (self._base * self._spacing_m)
-        return np.abs(self._filter.process(slope))
-
-
 def slope_gain(wave_number_cpm: npt.ArrayLike, tire_base_m: float = TIRE_BASE_M) -> Array:
     """Amplitude of the suspension's slope z_s' - z_u' per amplitude of the road's slope, for a sinusoidal road.
 
@@ -135,16 +81,34 @@ def rectified_slope(elevation_m: npt.ArrayLike, spacing_m: float) -> Array:
     elevation_m    (n,) elevations at uniform spacing [m]
     spacing_m      [m], at most 0.3 m
 
-    Value i is that at the end of the step from sample i to i + 1. There are n - k of them, k being the samples of the
-    tire's base (1 from about 167 mm of spacing on). This is ``GoldenCarFilter`` fed at once. ValueError if the
-    profile is shorter than 11 m, too coarse or not finite.
+    Problem: the IRI drives a quarter car at 80 km/h over a profile, step by step and exactly: a straight line between
+    samples is a constant slope over a step. Solution: driven by the road's slope, the suspension's slope z_s' - z_u' is
+    -(kt / mu) s^2 / D(s), D the characteristic polynomial with two pairs of complex poles p. Its response to a slope
+    that is held over a step has a closed form,
+
+        H(z) = (1 - 1/z) sum over p of r q / (1 - q / z),   q = exp(p dx / V),   r = -(kt / mu) p / product of (p -
+          others),
+
+    the value at the end of a step coming with the slope of that step. The residues r sum to zero, which leaves a
+    numerator of second order beside the factor 1 - 1/z: two second-order sections, exact for the profile as it is
+    sampled. That factor also makes a straight grade exactly smooth, which the printed coefficients of World Bank
+    Technical Paper 46 do not. At rest on a constant slope is the start that ASTM E1926 asks for (states: slope, slope,
+    0, 0).
+
+    Value i is that at the end of the step from sample i to i + 1; the tire's average takes the slope to the elevation
+    250 mm ahead. There are n - k of them, k being the samples of the tire's base (1 from about 167 mm of spacing on).
+    ValueError if the profile is shorter than 11 m, too coarse or not finite.
     """
-    car = GoldenCarFilter(spacing_m)
+    car = BlockFilter(golden_car_sections(spacing_m))
     elevation = np.asarray(elevation_m, dtype=float)
     length_m = (elevation.size - 1) * spacing_m
     if length_m < START_M * (1 - 1e-9):
         raise ValueError(f"expected a profile of at least {START_M:g} m, found {max(length_m, 0):.4g} m")
-    return car.push(elevation)
+    if elevation.ndim != 1 or not np.isfinite(elevation).all():
+        raise ValueError("expected a row of finite elevations")
+    base, start = (max(1, int(length / spacing_m + 0.5)) for length in (TIRE_BASE_M, START_M))
+    car.reset((elevation[start] - elevation[0]) / (start * spacing_m))
+    return np.abs(car.process((elevation[base:] - elevation[:-base]) / (base * spacing_m)))
 
 
 def iri(elevation_m: npt.ArrayLike, spacing_m: float) -> float:
@@ -191,54 +155,6 @@ class IriWindow:
     distance_end_m: float
     iri_m_per_km: float
     partial: bool
-
-
-class IriWindows:
-    """Cuts the slopes of ``GoldenCarFilter`` into windows of equal length; any split gives the same bits.
-
-    ValueError unless a window holds at least one step.
-    """
-
-    def __init__(self, spacing_m: float, window_m: float) -> None:
-        if not spacing_m <= window_m < float("inf"):
-            raise ValueError(f"expected a finite window of at least the {spacing_m:g} m between samples, found "
-                             f"{window_m:g} m")
-        self._spacing_m = spacing_m
-        self._window_m = window_m
-        self._number = 0
-        self._offset = 0
-        self._count = 0
-        self._blocks: list[Array] = []
-
-    def push(self, slope: Array) -> list[IriWindow]:
-        """The windows that the next rectified slopes (n,) [m/m] complete."""
-        self._blocks.append(slope)
-        self._count += len(slope)
-        if self._count < self._edge(self._number + 1):
-            return []
-        waiting = np.concatenate(self._blocks)
-        windows = []
-        while self._count >= (stop := self._edge(self._number + 1)):
-            windows.append(self._window(waiting, stop, (self._number + 1) * self._window_m, partial=False))
-            self._number += 1
-        kept = floor(self._edge(self._number)) - self._offset
-        self._blocks = [waiting[kept:]]
-        self._offset += kept
-        return windows
-
-    def finish(self) -> list[IriWindow]:
-        """The last window, cut short by the end of the profile; none when the profile ends with a window."""
-        if self._count <= self._edge(self._number):
-            return []
-        return [self._window(np.concatenate(self._blocks), self._count, self._count * self._spacing_m, partial=True)]
-
-    def _edge(self, number: int) -> float:
-        return _steps(number * self._window_m, self._spacing_m)
-
-    def _window(self, waiting: Array, stop: float, end_m: float, partial: bool) -> IriWindow:
-        start = self._edge(self._number)
-        mean = _mean_between(waiting, start - self._offset, stop - self._offset)
-        return IriWindow(self._number * self._window_m, end_m, PER_KM * mean, partial)
 
 
 def _steps(distance_m: float, spacing_m: float) -> float:
@@ -296,10 +212,24 @@ def continuous_iri(elevation_m: Array, elevation_right_m: Array | None, spacing_
 
 
 def _track(elevation_m: Array, spacing_m: float, window_m: float) -> tuple[Array, list[IriWindow]]:
-    cutter = IriWindows(spacing_m, window_m)
     slope = rectified_slope(elevation_m, spacing_m)
-    windows = cutter.push(slope) + cutter.finish()
+    windows = windows_of(slope, spacing_m, window_m)
     return np.array([PER_KM * slope.mean(), *(window.iri_m_per_km for window in windows)]), windows
+
+
+def windows_of(slope: Array, spacing_m: float, window_m: float) -> list[IriWindow]:
+    """What ``rectified_slope`` gave in windows of one length, the last cut short by the end of the profile. ValueError
+    unless a window holds at least one step."""
+    if not spacing_m <= window_m < float("inf"):
+        raise ValueError(f"expected a finite window of at least the {spacing_m:g} m between samples, found "
+                         f"{window_m:g} m")
+    windows: list[IriWindow] = []
+    while (start := _steps(begin_m := len(windows) * window_m, spacing_m)) < len(slope):
+        end_m = (len(windows) + 1) * window_m
+        if partial := (stop := _steps(end_m, spacing_m)) > len(slope):
+            stop, end_m = len(slope), len(slope) * spacing_m
+        windows.append(IriWindow(begin_m, end_m, PER_KM * _mean_between(slope, start, stop), partial))
+    return windows
 
 
 @dataclass(frozen=True)
