@@ -283,7 +283,7 @@ def test_signals_that_cannot_be_are_refused_in_one_line(bench: Path, tmp_path: P
 @pytest.mark.slow
 def test_two_more_signals_name_and_measure_the_friction(bench: Path, tmp_path: Path,
                                                         capsys: pytest.CaptureFixture[str]) -> None:
-    run = with_signals(tmp_path / "run", Rig(friction_n=0.5), 14.0, 7)
+    run = with_signals(tmp_path / "run", Rig(friction_n=0.5), 9.0, 7)
     found = reported(capsys, "diagnose", "--vehicle", bench / "rig.yaml", run)
     assert found["verdict"] == ["dry_friction"]
     added = reported(capsys, "add-effect", "dry_friction", "--vehicle", bench / "rig.yaml", run,
@@ -299,7 +299,7 @@ def test_two_more_signals_name_and_measure_the_friction(bench: Path, tmp_path: P
 def test_dry_friction_in_a_bench_rig_is_named_and_measured(
         bench: Path, tmp_path: Path, kind: str, capsys: pytest.CaptureFixture[str]) -> None:
     """0.5 N in a rig of 25 N. The force is known to the tolerance of the masses at best, as forces over masses move."""
-    table = random_table(14.0, 7) if kind == "random" else swept_table(14.0)
+    table = random_table(14.0, 7) if kind == "random" else swept_table(10.0)
     seen = shaken(Rig(friction_n=0.5), table)
     write_run(tmp_path / "run", seen, NOISE_MPS2, 8)
     found = reported(capsys, "diagnose", "--vehicle", bench / "rig.yaml", tmp_path / "run",

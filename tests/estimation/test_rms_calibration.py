@@ -26,6 +26,8 @@ from logger.vehicle.linearise import known_vehicle
 from logger.vehicle.models import GOLDEN_CAR, half_car
 from logger.vehicle.vehicle import SensorPlace, Vehicle
 
+from ..support.slow import release
+
 RAV4 = read_vehicle(vehicle_file("rav4-2009"))
 FULL_CAR = replace(RAV4, model="full_car", sprung_mass_kg=1750.0, pitch_inertia_kg_m2=2200.0, roll_inertia_kg_m2=600.0,
                    track_width_m=1.5)
@@ -67,7 +69,7 @@ def test_the_standard_error_is_that_of_other_roads() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("speed_mps", [4.5, 17.9, 31.3])
+@pytest.mark.parametrize("speed_mps", [4.5, *release(17.9), 31.3])
 def test_lines_and_spread_agree_with_drives_in_the_time_domain(speed_mps: float) -> None:
     """scipy's simulation, the exact IRI of the profile and the weighting of a record, over 16 km of another road."""
     found = calibrate(known_vehicle(RAV4), None, CalibrationSettings((speed_mps,)))[0]

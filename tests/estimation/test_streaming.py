@@ -391,7 +391,7 @@ def test_no_piece_holds_waves_that_pass_as_slowly_as_a_sensor_drifts() -> None:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("range_g", [2, 4])
+@pytest.mark.parametrize("range_g", [*release(2), 4])
 def test_reading_several_times_per_sample_gains_and_its_errors_are_right(range_g: int) -> None:
     """Slow drives over roads that hide in the steps: four readings per sample, each twice as noisy, against one. Taken
     as bounds their errors come out right; with their mean taken to have no steps they were too small by half."""

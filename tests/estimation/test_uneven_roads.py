@@ -136,7 +136,7 @@ def test_stretches_four_times_as_rough_as_others(sensor: Sensor, least_r2: float
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("window_m", "place_std_m"),
-                         [(WINDOW_M, 2.0), (WINDOW_M, 0.5), (4 * WINDOW_M, 2.0)])
+                         [*release((WINDOW_M, 2.0)), (WINDOW_M, 0.5), (4 * WINDOW_M, 2.0)])
 def test_a_misplaced_window_is_as_uncertain_as_windows_on_either_side_differ(
         window_m: float, place_std_m: float) -> None:
     """On three roads that are eight times as rough every other 150 m, whose windows that far behind and that far ahead

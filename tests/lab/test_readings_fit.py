@@ -15,7 +15,7 @@ from ..benchmarks.coarse_identify import PLACE_STD_M, STEP_MPS2, TRUE, wandering
 
 def drive(seed: int, step_mps2: float, noise_mps2: float, off_m: float) -> ridelog.Run:
     car = ridelog.read_vehicle("rav4-2009").with_numbers(TRUE)
-    run = ridelog.simulate(car, ridelog.random_road(iso_class="B", length_m=200.0, seed=seed), 11.0,
+    run = ridelog.simulate(car, ridelog.random_road(iso_class="B", length_m=140.0, seed=seed), 11.0,
                            noise_mps2=noise_mps2, step_mps2=step_mps2, seed=seed)
     away_m = off_m * wandering(len(run.distance_m), run.rate_hz, np.random.default_rng(seed))
     return replace(run, distance_m=run.distance_m + away_m)

@@ -293,7 +293,7 @@ def test_coulomb_friction_takes_the_same_from_each_swing_and_holds_at_last() -> 
 @pytest.mark.slow
 def test_compiled_and_plain_python_agree(monkeypatch: pytest.MonkeyPatch) -> None:
     assert stepping_loop.COMPILED, "the tests need the lab extra"
-    rough = 0.02 * np.random.default_rng(1).standard_normal((2, 20)).repeat(4, axis=1).T
+    rough = 0.02 * np.random.default_rng(1).standard_normal((2, 10)).repeat(4, axis=1).T
     laws = [*compose(RAV4, EVERYTHING).laws]
     laws = [one.with_force(lambda x, v: 500 * v * np.abs(v) + 3000 * x).with_tire(lambda d: 1e6 * d**3) for one in laws]
     more = compose(RAV4, [effect("hysteresis", yield_force_n=50, yield_travel_m=0.002),

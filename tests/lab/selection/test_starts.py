@@ -21,6 +21,7 @@ from logger.vehicle.effect import Misalignment
 
 from ...support.drives.bench_rig import Rig, shaken, swept_table, write_run
 from ...support.lab.secret_runs import EFFECTS, car_off_by, hidden, posterior_of, secret_runs
+from ...support.slow import release
 
 CANDIDATES = ("progressive_spring", "frame_friction", "dry_friction", "sensor_gain")
 FILE = ("name: bench\nmodel: quarter_car\nsprung_mass_kg: 2.5 +- 2%\nfront:\n  unsprung_mass_kg: {}\n"
@@ -30,7 +31,8 @@ FILE = ("name: bench\nmodel: quarter_car\nsprung_mass_kg: 2.5 +- 2%\nfront:\n  u
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("rig", "effect", "number", "truth"), [
-    (Rig(wheel_kg=1.0, damper=7.5, tire=6000.0, cubic=4e6), "progressive_spring", "cubic_stiffness_n_per_m3", 4e6),
+    *release((Rig(wheel_kg=1.0, damper=7.5, tire=6000.0, cubic=4e6), "progressive_spring", "cubic_stiffness_n_per_m3",
+              4e6)),
     (Rig(wheel_kg=1.0, damper=7.5, tire=6000.0, body_guide_n=1.5), "frame_friction", "body_friction_force_n", 1.5),
     (Rig(wheel_kg=1.0, damper=7.5), "", "", 0.0)])
 def test_an_effect_is_found_though_the_file_is_off_by_a_factor_of_two(
