@@ -142,8 +142,8 @@ def learned_noise(
         tried = Sensor(before.noise_rms_mps2, sensor.step_mps2)
         estimator = RoadEstimator(car, tried, window_m, noise=before)
         estimator.push(reading_mps2, np.ones(count, dtype=np.bool_), np.zeros(count), distance_m)
-        found = estimator.noise
-        if found is None or not estimator.noise_stretches:
+        found = estimator.road.noise
+        if found is None or not estimator.road.noise_stretches:
             return None
         belief = found
         if abs(belief.log_mean - before.log_mean) < _NEAR_ENOUGH * belief.log_std:

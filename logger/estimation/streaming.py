@@ -130,6 +130,8 @@ class RoadEstimator:
     driven_share     way that was driven over what the distance says; windows are of that distance
     reads            readings of each sample; more than one only where the sensor is coarse
     noise_log_std    of a noise that is not learned: standard error of its logarithm
+
+    ``road`` knows what was learned on the way.
     """
 
     def __init__(self, car: KnownCar, sensor: Sensor, window_m: float, place_std_m: float = 0.0,
@@ -153,7 +155,7 @@ class RoadEstimator:
         self._spacing_m = self._piece_m / self._points
         self._on_road = on_road
         self._ride = None if ride_response is None else RidePosterior(ride_response, BLOCK_SAMPLES, RATE_HZ)
-        self._road = FollowedRoad(sensor, self._spacing_m, vehicle_error, noise, noise_log_std)
+        self.road = FollowedRoad(sensor, self._spacing_m, vehicle_error, noise, noise_log_std)
         self._kept: dict[LinearCar, _Answers] = {}
         self._answers = self._answers_on(COMMON_ROAD, COMMON_SPEED_MPS)
         self._ride_ahead_m = ride_ahead_m
@@ -174,25 +176,11 @@ class RoadEstimator:
             BentForces(self._car, car, speed_mps, BLOCK_SAMPLES, RATE_HZ) if isinstance(self._car, MovedCar) else None)
         return self._kept[car]
 
-    @property
-    def noise_stretches(self) -> int:
-        """From how many stretches the noise was learned."""
-        return self._road.noise_stretches
-
-    @property
-    def noise(self) -> NoiseBelief | None:
-        """What is believed of the sensor's noise now; None where it is not learned."""
-        return self._road.noise
-
-    def next_drive(self) -> None:
-        """The car stood for long: what comes now is the same sensor on another day."""
-        self._road.next_drive()
-
     def _restart(self) -> None:
         self._waiting = RoadSamples.unread(0, 0.0, 0.0, self._reads)
         self._heard = 0
         self._samples: RoadSamples | None = None
-        self._road.restart()
+        self.road.restart()
         self._next = 0
         self._beyond, self._beyond_variance = np.zeros(BLOCK_SAMPLES), 0.0
         self._gathered: list[_Piece] = []
@@ -237,7 +225,7 @@ class RoadEstimator:
             after = RoadSamples.unread(count, float(last.distance_m[-1]), 0.0, self._reads)
             self._heard = _FIRST_SAMPLES
             estimates = self._pushed(after)
-        self._road.driven_off()
+        self.road.driven_off()
         self._restart()
         return estimates
 
@@ -249,10 +237,10 @@ class RoadEstimator:
             self._next = windows * self._pieces_per_window
         self._samples = self._samples.part(len(fresh), BLOCK_SAMPLES).then(fresh)
         self._beyond = np.concatenate([self._beyond[len(fresh):], np.zeros(len(fresh))])
-        self._road.move_on(fresh)
+        self.road.move_on(fresh)
         self._look_whether_parked(fresh)
         self._heard += len(fresh)
-        if not self._road.begun and self._heard < _FIRST_SAMPLES:
+        if not self.road.begun and self._heard < _FIRST_SAMPLES:
             return []
         passed_m = self._samples.distance_m[-1 - round(LAG_S * RATE_HZ)] + 1e-9
         begun = self._next
@@ -265,9 +253,9 @@ class RoadEstimator:
         assert self._samples is not None
         both = self._samples.part(BLOCK_SAMPLES - 2 * len(fresh), BLOCK_SAMPLES)
         if both.distance_m[-1] > both.distance_m[0]:
-            self._road.driven_off()
+            self.road.driven_off()
         elif both.read.all() and not both.at_end.any():
-            self._road.parked(fresh.reading_mps2[fresh.usable])
+            self.road.parked(fresh.reading_mps2[fresh.usable])
 
     def _estimates(self, samples: RoadSamples, due: Sequence[int]) -> list[WindowEstimate]:
         """Solve the block and take the pieces that are due."""
@@ -277,7 +265,7 @@ class RoadEstimator:
             unread = [_nothing(self._why_none(samples, number)) for number in due]
             return [one for number, piece in zip(due, unread, strict=True) for one in self._window(number, piece)]
         if self._answers.bent is None:
-            solved = self._road.solved(block, samples, read)
+            solved = self.road.solved(block, samples, read)
         else:
             block, solved = self._solved_in_turns(block, samples, read)
         slope = np.fft.irfft(solved.road * golden_car_on_grid(block.count, self._spacing_m), block.count)
@@ -297,14 +285,14 @@ class RoadEstimator:
             else:
                 variance = 1 / float(np.mean(1 / solved.variance[inside]))
                 back = round(_REMEMBERED_M / self._spacing_m)
-                level = self._road.level_at(number * self._points - back, back + self._points + 1)
+                level = self.road.level_at(number * self._points - back, back + self._points + 1)
                 rise = log_relative[inside] + (COMMON_ROAD.log_level - level[0].log_level)
                 piece = self._piece(slope[inside], unseen[inside], rise, speed_mps, variance, *level)
                 if weighted is not None:
                     # Of a sample, which has that share of a reading's noise.
-                    log_std = self._road.noise_log_std / self._reads
-                    place = RidePlace(block.car, speed_mps, variance, *level, self._road.sensor, log_std,
-                                      self._road.scale_log_std, solved.other_psd)
+                    log_std = self.road.noise_log_std / self._reads
+                    place = RidePlace(block.car, speed_mps, variance, *level, self.road.sensor, log_std,
+                                      self.road.scale_log_std, solved.other_psd)
                     piece = replace(piece, ride=self._ride_sums(weighted, samples, block.moving, number, place))
                 self._give_road(number, elevation[inside], speed_mps, variance, level[0])
             estimates += self._window(number, piece)
@@ -312,20 +300,20 @@ class RoadEstimator:
 
     def _driven(self, block: Block) -> Block:
         """The block, with the car as it is on this road at this speed."""
-        there, _ = self._road.level_at(round(block.start_m / self._spacing_m), block.count)
+        there, _ = self.road.level_at(round(block.start_m / self._spacing_m), block.count)
         self._answers = self._answers_on(there, block.mean_speed_mps)
         return block.on(self._answers.grid)
 
     def _solved_in_turns(self, block: Block, samples: RoadSamples, read: Bools) -> tuple[Block, SolvedBlock]:
         """Road and forces beyond those of the linear car by turns: what these do to the readings is taken off them."""
-        turns = _TURNS if self._road.begun else _FIRST_TURNS
+        turns = _TURNS if self.road.begun else _FIRST_TURNS
         for turn in range(turns):
             block = self._driven(block)
             beyond = between(self._beyond, self._reads).reshape(-1, self._reads)
             linear = replace(samples, reading_mps2=samples.reading_mps2 - beyond)
-            solved = self._road.solved(block, linear, read, beyond_mps2=self._beyond, turns=_TURNS,
+            solved = self.road.solved(block, linear, read, beyond_mps2=self._beyond, turns=_TURNS,
                                        beyond_variance=self._beyond_variance, is_last=turn == turns - 1)
-            there, _ = self._road.level_at(round(block.start_m / self._spacing_m), block.count)
+            there, _ = self.road.level_at(round(block.start_m / self._spacing_m), block.count)
             noise_psd = reading_noise_psd(1 / float(np.mean(1 / solved.variance)), RATE_HZ, block.mean_speed_mps)
             resolved = resolved_share(block.car, block.mean_speed_mps, there, noise_psd)
             assert self._answers.bent is not None
@@ -334,7 +322,7 @@ class RoadEstimator:
             solved = replace(solved, accel_mps2=solved.accel_mps2 + self._beyond)
             change = _WAY * (found - self._beyond)
             self._beyond = self._beyond + change
-            self._road.take_off(change)
+            self.road.take_off(change)
         return block, solved
 
     def _ride_sums(
@@ -360,7 +348,7 @@ class RoadEstimator:
         resolved = knowledge.resolved * (1 - float(unseen.mean()))
         missing = "" if resolved >= FAINT_BELOW else "faint" if knowledge.resolved < FAINT_BELOW else "unsettled"
         iri = window_iri(slope, unseen, rise, knowledge, log_level_std, self._piece_m, self._misplaced_m(speed_mps))
-        like_noise = iri.iri_m_per_km * self._road.scale_log_std
+        like_noise = iri.iri_m_per_km * self.road.scale_log_std
         iri = replace(iri, common_std_m_per_km=hypot(iri.common_std_m_per_km, like_noise))
         return _Piece(iri, resolved, missing, speed_mps)
 

@@ -236,23 +236,11 @@ GAP_M = 50.0  # between windows: what lay beside before says nothing after
 _STREET_M, _STRAIGHT = 5.0, 0.9  # aside, and cosine: so near the next way continues the one before
 
 
-@dataclass(frozen=True)
-class Receiver:
-    """What is believed of the positions.
-
-    std_m             of the slow error to the east, and to the north [m]
-    correlation_s     time after which it is another one by 1 - 1/e [s]
-    aside_m           what windows scatter aside beyond that: lanes, the car in its lane, fast errors [m]
-
-    A receiver in the open has 2 to 3 m (data sheets: 2.5 m CEP, which is 2.1 m in each component), between houses 4 m.
-    """
-
-    std_m: float = 3.0
-    correlation_s: float = 120.0
-    aside_m: float = 2.0
-
-
-USUAL = Receiver()
+# A receiver in the open has a slow error of 2 to 3 m to the east and as much to the north (data sheets: 2.5 m CEP,
+# which is 2.1 m in each component), between houses 4 m; after the time it is another one by 1 - 1/e.
+_STD_M, _CORRELATION_S = 3.0, 120.0
+_SPREAD_M2 = 2 * _STD_M**2  # variance of the difference of two such errors
+_ASIDE_M = 2.0  # what windows scatter aside beyond that: lanes, the car in its lane, fast errors
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,6 +261,7 @@ class Matched:
 
 _State = tuple[float, float, float, float, float]
 """Error to the east and north [m], and its covariance (ee, en, nn) [m2]."""
+_UNKNOWN_ERROR: _State = (0.0, 0.0, _SPREAD_M2, 0.0, _SPREAD_M2)
 
 
 class _Chain(NamedTuple):
@@ -298,23 +287,21 @@ class _Chain(NamedTuple):
     rivals: tuple[tuple[int, float], ...] = ()
 
 
-def match(network: RoadNetwork, trace: Trace, receiver: Receiver = USUAL, start: _State | None = None
-          ) -> tuple[Matched, _State]:
+def match(network: RoadNetwork, trace: Trace, start: _State = _UNKNOWN_ERROR) -> tuple[Matched, _State]:
     """Lay a trace on the ways of a network, or on none where none is likely.
 
     start    error to the east and north at the beginning and its covariance (ee, en, nn), as this function gives it for
-             the end; None: not known
+             the end
     """
     sure = 0.8  # as of places to visit: a street that is less likely than this is not to be believed
     count = len(trace.t_s)
     found = network.candidates(trace)
     if not len(found.window):
-        spread = 2 * receiver.std_m**2
-        return _nowhere(count), (0.0, 0.0, spread, 0.0, spread)
-    path, states, belief = _best_chain(network, trace, receiver, start, found)
+        return _nowhere(count), _UNKNOWN_ERROR
+    path, states, belief = _best_chain(network, trace, start, found)
     on = path >= 0
     point = np.where(on, found.point[np.maximum(path, 0)], NO_WAY)
-    smooth = _smoothed(trace, receiver, states)
+    smooth = _smoothed(trace, states)
     u_east, u_north = network.plane_heading()
     rel_e, rel_n = found.east_m[np.maximum(path, 0)], found.north_m[np.maximum(path, 0)]
     at = np.maximum(point, 0)
@@ -322,19 +309,19 @@ def match(network: RoadNetwork, trace: Trace, receiver: Receiver = USUAL, start:
     end_e, end_n, end_ee, end_en, end_nn = states[-1].tolist()
     way = np.where(on, network.way[at], NO_WAY)
     aside_m = rel_n * u_east[at] - rel_e * u_north[at]
-    doubtful = on & _too_far(way, aside_m, receiver) | (belief < sure)
+    doubtful = on & _too_far(way, aside_m) | (belief < sure)
     on &= ~doubtful
     way[doubtful], point = DOUBTFUL, np.where(on, point, NO_WAY)
     return Matched(way, np.where(on, network.along_m[at] + along, np.nan), point,
                    np.where(on, aside_m, np.nan)), (end_e, end_n, end_ee, end_en, end_nn)
 
 
-def _too_far(way: Ints, aside_m: Array, receiver: Receiver) -> Bools:
+def _too_far(way: Ints, aside_m: Array) -> Bools:
     """Windows of stretches on one way that lie further aside on the mean than the difference of two errors should."""
     believed = 2.0  # standard deviations that a stretch may lie aside of its way
     stretch = np.cumsum(np.diff(way, prepend=way[:1]) != 0)
     mean_m = np.bincount(stretch, np.nan_to_num(aside_m)) / np.bincount(stretch)
-    return np.asarray(np.abs(mean_m[stretch]) > believed * 2**0.5 * receiver.std_m)
+    return np.asarray(np.abs(mean_m[stretch]) > believed * 2**0.5 * _STD_M)
 
 
 def _nowhere(count: int) -> Matched:
@@ -342,15 +329,13 @@ def _nowhere(count: int) -> Matched:
     return Matched(none, np.full(count, np.nan), none, np.full(count, np.nan))
 
 
-def _best_chain(network: RoadNetwork, trace: Trace, receiver: Receiver, start: _State | None, found: Candidates
-                ) -> tuple[Ints, Array, Array]:
+def _best_chain(network: RoadNetwork, trace: Trace, start: _State, found: Candidates) -> tuple[Ints, Array, Array]:
     """Candidate of each window (n,), NO_WAY for none, the filtered errors (n, 5) along that chain, and how likely each
     window is to lie on its street (n,)."""
     count = len(trace.t_s)
     most_chains = 16
     lists = _Lists.of(network, found, count)
-    spread = 2 * receiver.std_m**2
-    chains = [_Chain(0.0, NO_WAY, False, NO_WAY, start or (0.0, 0.0, spread, 0.0, spread), (0.0, 0.0), -1)]
+    chains = [_Chain(0.0, NO_WAY, False, NO_WAY, start, (0.0, 0.0), -1)]
     steps_s, steps_m = np.diff(trace.t_s, prepend=trace.t_s[:1]), np.diff(trace.distance_m, prepend=0.0)
     history: list[list[_Chain]] = []
     before = range(0)
@@ -359,14 +344,14 @@ def _best_chain(network: RoadNetwork, trace: Trace, receiver: Receiver, start: _
         if step_m > GAP_M:
             before = range(0)
             chains = [chain._replace(candidate=NO_WAY, known=False) for chain in chains]
-        ahead = [(number, chain._replace(error=_drifted(chain.error, step_s, receiver, spread)))
+        ahead = [(number, chain._replace(error=_drifted(chain.error, step_s)))
                  for number, chain in enumerate(chains)]
         # Variance that the difference of two errors gains in this time [m2].
-        drift = 2 * receiver.std_m**2 * (1 - exp(-2 * max(step_s, 0.0) / receiver.correlation_s))
+        drift = _SPREAD_M2 * (1 - exp(-2 * max(step_s, 0.0) / _CORRELATION_S))
         new = [found for one in here for found in _distinct(
-            [_on(lists, chain, one, number, here, before, receiver) for number, chain in ahead])]
+            [_on(lists, chain, one, number, here, before) for number, chain in ahead])]
         new += [found for one in here for found in _distinct(
-            [_beside(lists, chain, one, number, here, before, drift, receiver) for number, chain in ahead])]
+            [_beside(lists, chain, one, number, here, before, drift) for number, chain in ahead])]
         if not here:
             new = [chain._replace(candidate=NO_WAY, known=False, parent=number, rivals=()) for number, chain in ahead]
         best = max(chain.score for chain in new)
@@ -425,7 +410,7 @@ def _belief(history: Sequence[Sequence[_Chain]], lists: _Lists) -> Array:
     return found
 
 
-def _on(lists: _Lists, chain: _Chain, one: int, parent: int, here: range, before: range, receiver: Receiver) -> _Chain:
+def _on(lists: _Lists, chain: _Chain, one: int, parent: int, here: range, before: range) -> _Chain:
     """A chain that goes on, or begins, on a known street."""
     score, last, known, reference, (error_e, error_n, ee, en, nn), *_ = chain
     point = lists.point[one]
@@ -437,12 +422,12 @@ def _on(lists: _Lists, chain: _Chain, one: int, parent: int, here: range, before
         # The error was against a way as wrong as its drives were; what it says of the receiver's own holds on.
         passes = lists.passes[reference]
         keeps = passes / (passes + 1)
-        own = receiver.std_m**2 * (1 / (passes + 1) + 1 / lists.passes[point])
+        own = _STD_M**2 * (1 / (passes + 1) + 1 / lists.passes[point])
         error_e, error_n = keeps * error_e, keeps * error_n
         ee, en, nn = keeps * keeps * ee + own, keeps * keeps * en, keeps * keeps * nn + own
     left_e, left_n = lists.left_e[one], lists.left_n[one]
     gain_e, gain_n = ee * left_e + en * left_n, en * left_e + nn * left_n
-    variance = gain_e * left_e + gain_n * left_n + receiver.aside_m**2
+    variance = gain_e * left_e + gain_n * left_n + _ASIDE_M**2
     off = lists.aside_m[one] - error_e * left_e - error_n * left_n
     score -= 0.5 * (off * off / variance + log(2 * pi * variance))
     gain_e, gain_n = gain_e / variance, gain_n / variance
@@ -451,18 +436,18 @@ def _on(lists: _Lists, chain: _Chain, one: int, parent: int, here: range, before
     return _Chain(score, one, True, point, error, (0.0, 0.0), parent)
 
 
-def _beside(lists: _Lists, chain: _Chain, one: int, parent: int, here: range, before: range, drift: float,
-            receiver: Receiver) -> _Chain:
+def _beside(lists: _Lists, chain: _Chain, one: int, parent: int, here: range, before: range, drift: float
+            ) -> _Chain:
     """A chain that goes on, or begins, on an unknown street beside a known one: so far aside as it was, or anywhere."""
     score, last, known, reference, error, beside, *_ = chain
-    fast, aside_m = receiver.aside_m**2, lists.aside_m[one]
+    fast, aside_m = _ASIDE_M**2, lists.aside_m[one]
     begins = known or last == NO_WAY
     if begins:
         score += _CHANGE if known and lists.goes_on(here, last) else 0.0
         beside = (0.0, 0.0)
     elif not lists.same(last, one) or lists.way[last] != lists.way[one]:
         was = next((other for other in before if lists.same(other, one)), NO_WAY)
-        apart = 0.0 if was == NO_WAY or lists.way[was] == lists.way[one] else receiver.std_m**2
+        apart = 0.0 if was == NO_WAY or lists.way[was] == lists.way[one] else _STD_M**2
         beside = (0.0, 0.0) if was == NO_WAY else (lists.aside_m[was], fast + apart)
     score += min((_clear_of(lists, other, error, fast) for other in here
                   if begins or not lists.goes_on(before, other)), default=0.0)
@@ -486,11 +471,11 @@ def _clear_of(lists: _Lists, one: int, error: _State, fast: float) -> float:
     return log(0.5 * (erfc((_STREETS_M - aside_m) / reach) + erfc((_STREETS_M + aside_m) / reach)) + least)
 
 
-def _drifted(state: _State, step_s: float, receiver: Receiver, spread: float) -> _State:
-    keeps = exp(-max(step_s, 0.0) / receiver.correlation_s)
+def _drifted(state: _State, step_s: float) -> _State:
+    keeps = exp(-max(step_s, 0.0) / _CORRELATION_S)
     error_e, error_n, ee, en, nn = state
     square = keeps * keeps
-    new = (1 - square) * spread
+    new = (1 - square) * _SPREAD_M2
     return keeps * error_e, keeps * error_n, square * ee + new, square * en, square * nn + new
 
 
@@ -504,12 +489,12 @@ def _traced_back(history: Sequence[Sequence[_Chain]]) -> tuple[Ints, Array]:
     return path, states
 
 
-def _smoothed(trace: Trace, receiver: Receiver, states: Array) -> Array:
+def _smoothed(trace: Trace, states: Array) -> Array:
     """Errors to the east and north (n, 2) as the whole drive gives them."""
-    keeps = np.exp(-np.diff(trace.t_s).clip(0.0) / receiver.correlation_s)
+    keeps = np.exp(-np.diff(trace.t_s).clip(0.0) / _CORRELATION_S)
     covariance = states[:, [2, 3, 3, 4]].reshape(-1, 2, 2)
     drifted = keeps[:, None, None]**2 * covariance[:-1] + (
-        (1 - keeps**2) * 2 * receiver.std_m**2)[:, None, None] * np.eye(2)
+        (1 - keeps**2) * _SPREAD_M2)[:, None, None] * np.eye(2)
     gain = np.einsum("nij,njk->nik", keeps[:, None, None] * covariance[:-1], np.linalg.inv(drifted))
     offset = states[:-1, :2] - np.einsum("nij,nj->ni", gain, keeps[:, None] * states[:-1, :2])
     found = np.array(states[:, :2])
@@ -561,10 +546,7 @@ class _Lists:
                    network.founder, network.passes)
 
 
-_Error = tuple[float, float, float, float, float]
-
-
-def lay(network: RoadNetwork, traces: Sequence[Trace], receiver: Receiver = USUAL) -> list[Matched]:
+def lay(network: RoadNetwork, traces: Sequence[Trace]) -> list[Matched]:
     """Lay drives over each other, one after the other: where no way is known a drive makes one, and ``network`` grows.
 
     A drive that passes a place again is laid over itself.
@@ -572,10 +554,10 @@ def lay(network: RoadNetwork, traces: Sequence[Trace], receiver: Receiver = USUA
     found = []
     for founder, trace in enumerate(traces, start=network.traces):
         parts: list[Matched] = []
-        state: _Error | None = None
+        state = _UNKNOWN_ERROR
         for start, end in _laps(trace):
             lap = trace.part(start, end)
-            matched, state = match(network, lap, receiver, state)
+            matched, state = match(network, lap, state)
             parts.append(_learned(network, lap, matched, founder))
         found.append(_joined(parts))
         network.traces = founder + 1
@@ -678,8 +660,8 @@ def route_network(lat_deg: Array, lon_deg: Array, measure_m: Array) -> RoadNetwo
     return network
 
 
-def on_route(network: RoadNetwork, trace: Trace, receiver: Receiver = USUAL) -> OnRoute:
+def on_route(network: RoadNetwork, trace: Trace) -> OnRoute:
     """Lay a drive on a route's two ways."""
-    found, _ = match(network, trace, receiver)
+    found, _ = match(network, trace)
     direction = np.where(found.way < 0, 0, np.where(found.way == 0, ALONG, AGAINST))
     return OnRoute(direction, direction * found.along_m)

@@ -173,12 +173,12 @@ class Pipeline(JudgedDrive):
     @property
     def noise(self) -> NoiseBelief | None:
         """What is believed of the accelerometer's noise now; None where it is not learned."""
-        return self._estimator.noise
+        return self._estimator.road.noise
 
     @property
     def noise_stretches(self) -> int:
         """From how many stretches of road that was learned."""
-        return self._estimator.noise_stretches
+        return self._estimator.road.noise_stretches
 
     def step(self, now_us: int, block: AccelerationBlock, fixes: list[Fix]) -> list[WindowRecord]:
         """Everything that happened before ``now_us`` [us, monotonic]; steps come in order of time."""
@@ -197,7 +197,7 @@ class Pipeline(JudgedDrive):
         records = self._records()
         if ended:
             self._active_us = None
-            self._estimator.next_drive()
+            self._estimator.road.next_drive()
             self.drive += 1
         self._forget()
         return records

@@ -316,12 +316,12 @@ def test_the_noise_of_a_drive_is_found(noise: float, guess: float, step: float) 
     before = NoiseBelief.guessed(guess)
     estimator = RoadEstimator(LinearCar(car, body_point(car)), Sensor(guess, step), 7.62, noise=before)
     estimator.push(reading, np.ones(len(way), dtype=bool), np.zeros(len(way)), way)
-    found = estimator.noise
+    found = estimator.road.noise
     assert found is not None
     assert found.log_std < 0.15
     assert abs(found.log_mean - np.log(noise)) < 2.5 * found.log_std
     taken = RoadEstimator(LinearCar(car, body_point(car)), Sensor(guess, step), 7.62)
-    assert taken.noise is None
+    assert taken.road.noise is None
 
 
 @pytest.mark.slow
@@ -336,7 +336,7 @@ def test_where_readings_toggle_the_error_of_the_noise_is_not_said_too_small() ->
         estimator = RoadEstimator(LinearCar(car, body_point(car)), Sensor(0.1, step), 7.62,
                                   noise=NoiseBelief.guessed(0.1))
         estimator.push(reading, np.ones(len(way), dtype=bool), np.zeros(len(way)), way)
-        found = estimator.noise
+        found = estimator.road.noise
         assert found is not None
         off.append((found.log_mean - np.log(noise)) / found.log_std)
     assert np.sqrt(np.mean(np.square(off))) < 3.0
@@ -353,10 +353,10 @@ def test_a_stand_bounds_the_noise_once_the_car_drives_off(noise: float, guess: f
                               noise=NoiseBelief.guessed(guess))
     everything = np.ones(count, dtype=bool), np.zeros(count)
     estimator.push(step * np.round(reading / step)[:3600], everything[0][:3600], everything[1][:3600], way[:3600])
-    assert estimator.noise_stretches == 0
+    assert estimator.road.noise_stretches == 0
     estimator.push(step * np.round(reading / step)[3600:], everything[0][3600:], everything[1][3600:], way[3600:])
-    assert estimator.noise_stretches == 1
-    found = estimator.noise
+    assert estimator.road.noise_stretches == 1
+    found = estimator.road.noise
     assert found is not None
     assert found.noise_rms_mps2 < 0.7 * guess
     assert found.log_mean + 2 * found.log_std > np.log(noise)
@@ -370,7 +370,7 @@ def test_a_car_that_swings_or_is_worked_at_bounds_nothing() -> None:
         reading = 0.6 * np.round(swing_mps2 * np.sin(2 * np.pi * 1.3 * np.arange(count) / 100) / 0.6)
         estimator.push(reading, np.ones(count, dtype=bool), np.zeros(count), np.zeros(count))
         estimator.finish()
-    assert estimator.noise_stretches == 0
+    assert estimator.road.noise_stretches == 0
 
 
 @pytest.mark.slow

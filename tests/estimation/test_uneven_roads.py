@@ -260,6 +260,6 @@ def test_stretches_that_steps_hide_do_not_change_the_waviness_of_the_others() ->
         nothing = np.zeros(len(reading))
         for part in np.array_split(np.arange(len(reading)), 20):
             estimator.push(reading[part], nothing[part] == 0, nothing[part], (ride.place_m - ride.place_m[0])[part])
-            found.append(estimator._road.level_at(0, 2)[0].waviness)
+            found.append(estimator.road.level_at(0, 2)[0].waviness)
     print(f"waviness {np.mean(found):.3f}, right 2")
     assert np.mean(found) == pytest.approx(2.0, abs=0.08)
