@@ -44,11 +44,6 @@ class GaussianReadings:
     variance: Array
 
 
-def first_guess(reading_mps2: Array, sensor: Sensor) -> GaussianReadings:
-    """Rounding as if it were noise."""
-    return GaussianReadings(reading_mps2.copy(), np.full(len(reading_mps2), sensor.variance_mps2_2))
-
-
 def bounds(reading_mps2: Array, at_end: Array, step_mps2: float) -> tuple[Array, Array]:
     """Bounds of what was rounded; ``at_end`` (t,) is 1 for a reading at the top of the range, -1 at the bottom."""
     low = np.where(at_end < 0, -np.inf, reading_mps2 - 0.5 * step_mps2)

@@ -23,7 +23,6 @@ from logger.estimation.quantisation import (
     GaussianReadings,
     bounds,
     cavity_of_reads,
-    first_guess,
     improved,
     standing_for,
     unexplained,
@@ -351,17 +350,18 @@ class FollowedRoad:
         else:
             residual = readings.value_mps2 - solution.fitted_mps2
             resolved_waves = 2 * seen_share * float(resolved.sum())
-            self._log_noise = with_noise(self._log_noise, residual, weight, resolved_waves)
+            slope, free = noise_slope(residual, weight, resolved_waves)
+            self._log_noise = with_noise(self._log_noise, slope, free)
             if learns and self._learner is not None:
-                self._learn_from_residual(noise_slope(residual, weight, resolved_waves), weight)
+                self._learn_from_residual(slope, free, weight)
         return SolvedBlock(solution.road, (solution.fitted_mps2 - solution.drift_mps2)[::reads],
                            mean_variance / reads / ratio, seen, np.exp(found), self._other.psd)
 
     def _as_gaussian(self, samples: RoadSamples) -> GaussianReadings:
-        if not self._is_coarse:
-            noise = self.sensor.variance_mps2_2 * exp(self._log_noise)
-            return GaussianReadings(samples.reading_mps2.ravel(), np.full(samples.reading_mps2.size, noise))
-        return first_guess(samples.reading_mps2.ravel(), self.sensor) if self._gaussian is None else self._gaussian
+        """Of coarse ones first with rounding as if it were noise."""
+        variance = self.sensor.variance_mps2_2 * exp(self._log_noise)
+        return self._gaussian or GaussianReadings(
+            samples.reading_mps2.ravel(), np.full(samples.reading_mps2.size, variance))
 
     def _improved(self, readings: GaussianReadings, samples: RoadSamples, read: Bools, solution: Solution,
                   others: Array) -> tuple[GaussianReadings, Array, Array]:
@@ -418,10 +418,9 @@ class FollowedRoad:
             for each in (answer, raised))
         return (other - one) / max(count, 1) / RISE
 
-    def _learn_from_residual(self, slope_and_freedom: tuple[float, float], weight: Array) -> None:
+    def _learn_from_residual(self, slope: float, free: float, weight: Array) -> None:
         """What a block says of the noise, as far as its readings are new: slope and freedom of ``noise_slope`` for a
         weight (t,). The car's own error, if it has one, counts as noise."""
-        slope, free = slope_and_freedom
         if not free:
             return
         share = min(self._unscored / len(weight), 1.0) / _MEDIAN_COST

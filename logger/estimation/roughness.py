@@ -182,7 +182,7 @@ class RoadLevels:
         squares = innovations**2
         rows = np.stack([squares, resolved, squares - (resolved - freedom) * np.exp(log_before), freedom,
                          np.ones(count)]) * seen
-        shares = _neighbours(count, self._reach)
+        shares = neighbours(count, self._reach)
         power, weight, squares, freedom, near = np.fft.irfft(np.fft.rfft(rows) * shares, count)
         power, weight, freedom = (np.maximum(row, 0.0) for row in (power, weight, freedom))
         self._learn_level(first, squares, freedom, weight, seen / float(shares[0]), learns)
@@ -260,7 +260,7 @@ class RoadLevels:
         """By how much the local means of a block scatter more than chance makes them: their variance less that of a
         weighted sum of squares of what has the correlation that the resolved shares give it (Isserlis)."""
         count = len(power)
-        near = _neighbours(count, self._reach)
+        near = neighbours(count, self._reach)
         correlation = np.fft.irfft(gain / (1 + gain), count)
         if correlation[0] <= 0 or not power.any():
             return
@@ -287,9 +287,6 @@ def resolved_shares(strength: Array, gain: Array, seen: Array, free: float | Non
     if free is not None:  # a hole rings on in the readings, which makes them more than it has degrees of freedom
         resolved = resolved * min(free / float(seen @ resolved), 1.0)
     return resolved, freedom
-
-
-_neighbours = lru_cache(neighbours)  # kept, for there are few counts and one reach
 
 
 @lru_cache(maxsize=16)

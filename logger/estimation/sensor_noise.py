@@ -244,9 +244,8 @@ def residual_evidence(slope: float, free: float, at: float, log_noise: Array) ->
     return np.asarray(-free * off - 0.5 * (free + slope) * np.exp(-2 * off))
 
 
-def with_noise(log_noise: float, residual_mps2: Array, weight: Array, resolved_waves: float) -> float:
+def with_noise(log_noise: float, slope: float, free: float) -> float:
     """One scoring step for the log of the noise variance over the sensor's, by ``noise_slope``."""
-    slope, free = noise_slope(residual_mps2, weight, resolved_waves)
     if not free:
         return log_noise
     step = (slope - log_noise / _NOISE_DEVIATION**2) / (0.5 * free + _NOISE_DEVIATION**-2.0)

@@ -79,7 +79,9 @@ def frequencies_hz(count: int, rate_hz: float) -> Array:
     return np.asarray(np.fft.rfftfreq(count, 1 / rate_hz), dtype=np.float64)
 
 
+@lru_cache(maxsize=32)
 def neighbours(count: int, reach: float) -> Array:
-    """The rfft of how much each neighbour of a point counts, on a closed grid of so many: exp(-(lag / reach)^2 / 2)."""
+    """The rfft of how much each neighbour of a point counts, on a closed grid of so many: exp(-(lag / reach)^2 / 2);
+    the last are kept."""
     lag = np.minimum(np.arange(count), count - np.arange(count))
     return np.asarray(np.fft.rfft(np.exp(-0.5 * (lag / reach) ** 2)).real)

@@ -17,7 +17,7 @@ from logger.estimation.road_spectrum import (
     log_waves,
 )
 from logger.estimation.roughness import mean_resolved
-from logger.estimation.sensor_noise import with_noise
+from logger.estimation.sensor_noise import noise_slope, with_noise
 from logger.roads import iso8608
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
@@ -179,7 +179,7 @@ def test_level_and_waviness_are_found_again(speed_mps: float) -> None:
 def noise_found(residual: np.ndarray, weight: np.ndarray, resolved_waves: float = 0.0) -> float:
     log_noise = 0.0
     for _ in range(12):
-        log_noise = with_noise(log_noise, residual, weight / np.exp(log_noise), resolved_waves)
+        log_noise = with_noise(log_noise, *noise_slope(residual, weight / np.exp(log_noise), resolved_waves))
     return float(np.exp(log_noise))
 
 
@@ -230,7 +230,7 @@ def test_a_pothole_that_is_not_explained_yet_is_no_noise() -> None:
 def test_a_sensor_that_hangs_is_not_taken_for_one_without_noise() -> None:
     log_noise = 0.0
     for _ in range(200):
-        log_noise = with_noise(log_noise, np.zeros(1000), np.full(1000, 1e6), 300.0)
+        log_noise = with_noise(log_noise, *noise_slope(np.zeros(1000), np.full(1000, 1e6), 300.0))
     assert log_noise == pytest.approx(-2.0, rel=1e-6)
 
 
@@ -239,7 +239,7 @@ def test_nothing_read_leaves_what_roads_are_like() -> None:
     waves = np.zeros(len(block.wave_number_cpm))
     found = learned(COMMON_ROAD, waves, waves, block.log_waves, 0.0, None)
     assert found == COMMON_ROAD
-    assert with_noise(0.0, np.zeros(1024), np.zeros(1024), 0.0) == pytest.approx(0.0, abs=0.2)
+    assert with_noise(0.0, *noise_slope(np.zeros(1024), np.zeros(1024), 0.0)) == pytest.approx(0.0, abs=0.2)
 
 
 @pytest.mark.parametrize("waviness", [1.6, 2.0, 2.4])

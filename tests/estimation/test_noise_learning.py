@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from scipy.stats import norm
 
 from logger.estimation.car_response import SteadyMotion
-from logger.estimation.quantisation import bounds, cavity, first_guess, improved, without_own
+from logger.estimation.quantisation import GaussianReadings, bounds, cavity, improved, without_own
 from logger.estimation.sensor_noise import (
     NoiseBelief,
     NoiseLearner,
@@ -96,7 +96,8 @@ def test_settled_rounds_give_the_slope_of_the_exact_evidence(noise: float, devia
                 likely = likely + times * np.log(np.maximum(share, 1e-300))
             return float(np.log(np.sum(np.exp(likely - likely.max()))) + likely.max())
 
-        readings, sensor = first_guess(reading, Sensor(noise, STEP)), Sensor(noise, STEP)
+        sensor = Sensor(noise, STEP)
+        readings = GaussianReadings(reading, np.full(len(reading), sensor.variance_mps2_2))
         for _ in range(80):
             variance = 1 / (deviation**-2 + (1 / readings.variance).sum())
             fitted = np.full(30, variance * (readings.value_mps2 / readings.variance).sum())

@@ -4,15 +4,7 @@ import numpy as np
 import pytest
 from scipy.stats import norm
 
-from logger.estimation.quantisation import (
-    GaussianReadings,
-    bounds,
-    first_guess,
-    improved,
-    standing_for,
-    unexplained,
-    without_own,
-)
+from logger.estimation.quantisation import GaussianReadings, bounds, improved, standing_for, unexplained, without_own
 from logger.estimation.sensor_noise import Sensor
 
 COARSE = Sensor(noise_rms_mps2=0.1, step_mps2=0.6)
@@ -36,7 +28,7 @@ def by_rounds(
     deviation: float, reading: np.ndarray, at_end: np.ndarray, sensor: Sensor, rounds: int = 60
 ) -> tuple[float, float]:
     """The same as the estimator finds it, with the exact solution of this tiny problem in between."""
-    readings = first_guess(reading, sensor)
+    readings = GaussianReadings(reading, np.full(len(reading), sensor.variance_mps2_2))
     low, high = bounds(reading, at_end, sensor.step_mps2)
     for _ in range(rounds):
         variance = 1 / (deviation**-2 + (1 / readings.variance).sum())
@@ -133,7 +125,7 @@ def test_two_neighbours_that_go_together() -> None:
     posterior = np.exp(-0.5 * distance) * likelihood[:, None] * likelihood
     alone = posterior.sum(axis=1) / posterior.sum()
     mean = alone @ axis
-    readings = first_guess(reading, COARSE)
+    readings = GaussianReadings(reading, np.full(len(reading), COARSE.variance_mps2_2))
     for _ in range(40):
         covariance = np.linalg.inv(np.linalg.inv(prior) + np.diag(1 / readings.variance))
         fitted = covariance @ (readings.value_mps2 / readings.variance)
@@ -164,18 +156,14 @@ def test_toggling_tells_the_edge() -> None:
 def test_a_solution_far_from_the_readings_stays_finite(off: float) -> None:
     reading = np.array([0.0, 0.6])
     low, high = bounds(reading, np.zeros(2), COARSE.step_mps2)
-    readings = first_guess(reading, COARSE)
+    readings = GaussianReadings(reading, np.full(len(reading), COARSE.variance_mps2_2))
     for _ in range(5):
         readings = improved(readings, low, high, *without_own(readings, reading + off, 1e-4), COARSE.noise_rms_mps2**2)
         assert np.isfinite(readings.value_mps2).all() and (readings.variance > 0).all()
 
 
-def test_the_first_guess_leaves_the_readings_as_they_are() -> None:
-    reading = np.array([1.0, 2.0])
-    guess = first_guess(reading, COARSE)
-    assert isinstance(guess, GaussianReadings)
-    assert guess.value_mps2.tolist() == [1.0, 2.0] and guess.value_mps2 is not reading
-    assert guess.variance == pytest.approx(0.1**2 + 0.6**2 / 12)
+def test_rounding_counts_as_noise_where_no_bounds_are_known() -> None:
+    assert COARSE.variance_mps2_2 == pytest.approx(0.1**2 + 0.6**2 / 12)
 
 
 @pytest.mark.parametrize(("noise", "step", "coarse"), [(0.05, 0.0, False), (0.05, 0.0981, False), (0.1, 0.613, True)])
