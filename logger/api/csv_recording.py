@@ -13,17 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from logger.api.extraction import (
-    RATE_HZ,
-    Extracted,
-    Fixes,
-    MeasuredProfile,
-    Recorded,
-    Tell,
-    apart,
-    folder_of,
-    write_runs,
-)
+from logger.api.extraction import RATE_HZ, Extracted, Fixes, MeasuredProfile, Recorded, apart, folder_of, write_runs
 from logger.arrays import Array
 from logger.bounds import ACCELERATION, LONGEST_HOLE_S, MOVING_MPS, SPEED, samples_between
 from logger.dsp.repeated_samples import find_holds, resolution, still_until_s
@@ -47,6 +37,7 @@ from logger.extraction.recorded_columns import (
 )
 from logger.left_out import LeftOut
 from logger.printable import counted, word
+from logger.question import Notify, silent
 from logger.runs import RecordFacts
 from logger.service import wiring
 from logger.service.config import Config
@@ -103,7 +94,7 @@ def run_name(source: Path) -> str:
 
 
 def extract_csv(source: Path, out: Path, asked: CsvSettings, given: Config | None = None,
-                measured: MeasuredProfile | None = None, tell: Tell = lambda words: None) -> Extracted:
+                measured: MeasuredProfile | None = None, tell: Notify = silent) -> Extracted:
     """Write the runs of a recording, a CSV file or a folder of such files of one recording, as ``extract_dump``.
 
     given       settings: the car, the receiver's delay and antenna; None: the defaults
@@ -119,7 +110,7 @@ def extract_csv(source: Path, out: Path, asked: CsvSettings, given: Config | Non
     return write_runs(recorded, source, run_name(source), out, measured, tell)
 
 
-def recorded_csv(source: Path, asked: CsvSettings, config: Config, tell: Tell) -> Recorded:
+def recorded_csv(source: Path, asked: CsvSettings, config: Config, tell: Notify) -> Recorded:
     """All of a recording. BadInput as ``extract_csv``."""
     if asked.vehicle is not None:
         config = replace(config, vehicle=vehicle_path(asked.vehicle))

@@ -4,7 +4,6 @@ It does not matter what recorded it: a dump of the box, which is decoded here, a
 logger (``csv_recording``) end here.
 """
 
-from collections.abc import Callable
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -25,11 +24,12 @@ from logger.extraction.along_track import registered
 from logger.extraction.recorded_columns import fix_times_s, stretches
 from logger.files import make_folder, remove_file, together
 from logger.left_out import LeftOut, counting
+from logger.question import Notify, silent
 from logger.runs import BY_RECEIVER, BY_ROAD, CLIPPED, LEAST_S, NO_READING, READING, RecordFacts, Run
 from logger.service import wiring
 from logger.service.config import Config
 from logger.service.drive_readings import DriveReadings, GridReadings
-from logger.service.event_core import EventCore
+from logger.service.event_core import EventCore, KeptRows
 from logger.service.main_loop import Player
 from logger.service.signal_chain import Axis
 from logger.service.wiring import Instrument, check_recorded_rate
@@ -40,8 +40,6 @@ from logger.store.formats.profile_file import Wheelpaths, read_places, read_prof
 from logger.store.formats.vehicle_file import CarModel, read_model
 from logger.units import STANDARD_GRAVITY_MPS2, US_PER_S
 from logger.vehicle.compose import compose
-
-Tell = Callable[[str], None]
 
 RATE_HZ = float(GRID_RATE_HZ)
 LEAST_M = 30.0
@@ -177,7 +175,7 @@ def folder_of(source: Path, word: str) -> str:
         return folder_name(word)
 
 
-def write_runs(recorded: Recorded, source: Path, name: str, out: Path, measured: MeasuredProfile | None, tell: Tell
+def write_runs(recorded: Recorded, source: Path, name: str, out: Path, measured: MeasuredProfile | None, tell: Notify
                ) -> Extracted:
     """Write the runs of a recording into ``out/NAME``, ``out/NAME-2``, ... in place of those that were made of it.
 
@@ -410,7 +408,7 @@ def name_of(dump: Path) -> str:
 
 
 def extract_dump(dump: Path, out: Path, given: Config | None, measured: MeasuredProfile | None = None,
-                 tell: Tell = lambda words: None, vehicle: str | None = None) -> Extracted:
+                 tell: Notify = silent, vehicle: str | None = None) -> Extracted:
     """Write the runs of a recorded dump into ``out/NAME``, ``out/NAME-2``, ...
 
     given       settings of that drive; None: the defaults, with what the recording's header says
@@ -427,7 +425,7 @@ def extract_dump(dump: Path, out: Path, given: Config | None, measured: Measured
     return write_runs(recorded_dump(dump, given, vehicle, tell), dump, name_of(dump), out, measured, tell)
 
 
-def recorded_dump(dump: Path, given: Config | None, vehicle: str | None, tell: Tell) -> Recorded:
+def recorded_dump(dump: Path, given: Config | None, vehicle: str | None, tell: Notify) -> Recorded:
     """All of a dump. BadInput and DumpError as ``extract_dump``."""
     with open_dump(dump) as reader:
         config = wiring.config_for_dump(reader.header, given, vehicle, place=f"{dump}:1")
@@ -436,7 +434,7 @@ def recorded_dump(dump: Path, given: Config | None, vehicle: str | None, tell: T
         known = wiring.receiver_for_dump(reader.header, config, place=f"{dump}:1")
         axis = Axis.from_word(config.accelerometer.vertical_axis)
         kept = DriveReadings(wiring.signal_chain(config, sensor), DriveAlignment(axis.column, axis.sign), known.delay_s)
-        core = EventCore(sensor.decoder, wiring.gps_decoder(config), kept, _NoRows())
+        core = EventCore(sensor.decoder, wiring.gps_decoder(config), kept, KeptRows())
         player = Player(core, 0.0, lambda played_s: tell(f"reading: {played_s / 60:.0f} min"))
         player.play(reader)
     receiver = known if known.std_s == 0.0 else combined(known, kept.alignment.estimate())
@@ -457,22 +455,6 @@ def _facts(sensor: Instrument, config: Config) -> RecordFacts:
     is_said = isinstance(config.accelerometer.noise_mps2, float)  # else whoever reads the run learns it
     return RecordFacts(step_mps2=reading.step_mps2 or None, range_mps2=range_g and range_g * STANDARD_GRAVITY_MPS2,
                        noise_mps2=reading.noise_rms_mps2 if is_said else None)
-
-
-class _NoRows:
-    """Where no rows go."""
-
-    def append(self, record: Any) -> None:
-        """Nothing."""
-
-    def rotate(self) -> None:
-        """Nothing."""
-
-    def set_clock_map(self, clock_map: Any) -> None:
-        """Nothing."""
-
-    def close(self) -> None:
-        """Nothing."""
 
 
 def _fixes_of_dump(kept: Any, later_s: float) -> Fixes:

@@ -6,6 +6,7 @@ time, how long the process slept or how fast a recording is played.
 """
 
 import logging
+from dataclasses import replace
 from typing import Protocol
 
 from drivers.accelerometers.accelerometer import Decoder
@@ -34,6 +35,34 @@ class RowSink(Protocol):
     def rotate(self) -> None: ...
     def set_clock_map(self, clock_map: ClockMap) -> None: ...
     def close(self) -> None: ...
+
+
+class KeptRows:
+    """A log that is kept in memory."""
+
+    def __init__(self) -> None:
+        self._records: list[WindowRecord] = []
+        self._clock: ClockMap | None = None
+
+    def append(self, record: WindowRecord) -> None:
+        self._records.append(record)
+
+    def rotate(self) -> None:
+        """There is but one."""
+
+    def set_clock_map(self, clock_map: ClockMap) -> None:
+        self._clock = clock_map
+
+    def close(self) -> None:
+        """Nothing to finish."""
+
+    def dated(self) -> list[WindowRecord]:
+        """The rows; those made before UTC was known get it, as in the files."""
+        clock = self._clock
+        if clock is None:
+            return self._records
+        return [record if record.utc_us is not None else replace(record, utc_us=record.t_us + clock.offset_us)
+                for record in self._records]
 
 
 class Stepped(Protocol):

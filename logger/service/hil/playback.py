@@ -30,11 +30,10 @@ from logger.estimation.receiver_delay import CarriedDelay
 from logger.records import WindowRecord
 from logger.service import wiring
 from logger.service.config import AXES, Config
-from logger.service.event_core import EventCore
+from logger.service.event_core import EventCore, KeptRows
 from logger.service.learning import KnownNoise, delay_at_start
 from logger.service.main_loop import EventMerger
 from logger.service.signal_chain import Axis
-from logger.store.log.sidecar import ClockMap
 from logger.units import STANDARD_GRAVITY_MPS2, US_PER_S
 
 PROGRESS_EVERY_US = US_PER_S
@@ -142,7 +141,7 @@ def expected_rows(recording: Wired, config: Config, place: str, receiver: Carrie
                            f"bytes of the {recording.bridged} are sent, found {found}")
     config = wiring.config_for_dump(recording.header, config, None, place)
     instrument = wiring.instrument(config.accelerometer, noise)
-    rows = _Rows()
+    rows = KeptRows()
     # As the service began, not as the recording: the header's delay is that of another drive.
     belief = delay_at_start(config.gps, receiver)
     pipeline = wiring.pipeline(config, instrument, wiring.car_of(config), belief)
@@ -151,34 +150,6 @@ def expected_rows(recording: Wired, config: Config, place: str, receiver: Carrie
         core.feed(event)
     core.finish()
     return rows.dated()
-
-
-class _Rows:
-    """A log that is kept in memory."""
-
-    def __init__(self) -> None:
-        self._records: list[WindowRecord] = []
-        self._clock: ClockMap | None = None
-
-    def append(self, record: WindowRecord) -> None:
-        self._records.append(record)
-
-    def rotate(self) -> None:
-        """There is but one."""
-
-    def set_clock_map(self, clock_map: ClockMap) -> None:
-        self._clock = clock_map
-
-    def close(self) -> None:
-        """Nothing to finish."""
-
-    def dated(self) -> list[WindowRecord]:
-        """The rows; those made before UTC was known get it, as in the files."""
-        clock = self._clock
-        if clock is None:
-            return self._records
-        return [record if record.utc_us is not None else replace(record, utc_us=record.t_us + clock.offset_us)
-                for record in self._records]
 
 
 def _first(events: Iterable[Event], length_us: int) -> Iterator[Event]:
