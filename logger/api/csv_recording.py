@@ -441,9 +441,9 @@ def _fixes(tables: _Tables, asked: CsvSettings, config: Config, origin_s: float,
             f"to {span_s[1]:.6g} s")
         raise BadInput(f"{table.header.path}: expected fixes by the clock of {path.name}, in the same period, found "
                        f"{said}")
-    found = found.part(inside)
+    found = found.of(inside)
     check_speed(table, found)
-    return found.part(apart(found.time_s))
+    return found.of(apart(found.time_s))
 
 
 _FEED_S = 10.0  # of readings at once, as they come in a car
@@ -481,11 +481,11 @@ def fixes_of(table: LoggerTable, origin_s: float, beside: LoggerTable, standing_
     said_mps = np.where(speed >= standing_mps, speed, 0.0) if has_speed else np.full(len(order), np.inf)
     rows = new_rows(time_s, np.nan_to_num(np.stack([table.columns[role][order] for role in roles], axis=1)), said_mps,
                     hidden_m(lat, lon) if has_places and len(order) else np.inf)
-    found = Fixes(time_s, speed, lat, lon).part(rows)
+    found = Fixes(time_s, speed, lat, lon).of(rows)
     if len(rows) > 1 and has_places and not np.isfinite(found.speed_mps).all():
         by_places = speeds_of_places(found.time_s, found.lat_deg, found.lon_deg)
         found = replace(found, speed_mps=np.where(np.isfinite(found.speed_mps), found.speed_mps, by_places))
-    return found.part(np.isfinite(found.speed_mps))
+    return found.of(np.isfinite(found.speed_mps))
 
 
 def _speed_scale(table: LoggerTable) -> float:

@@ -13,7 +13,7 @@ import numpy as np
 from drivers.dump import open_dump
 from drivers.errors import SettingsError
 from drivers.readings import folder_name
-from logger.arrays import Array, Bools
+from logger.arrays import Array, Bools, Rows
 from logger.bounds import CONFLICT_SIGMA
 from logger.dsp.resample import GRID_RATE_HZ
 from logger.errors import BadInput, as_bad_input
@@ -120,17 +120,13 @@ def read_measured_profile(path: Path) -> MeasuredProfile:
 
 
 @dataclass(frozen=True, eq=False)
-class Fixes:
+class Fixes(Rows):
     """Fixes (k,) with a speed and a place, at the instants at which they were true [s]; places NaN: not recorded."""
 
     time_s: Array
     speed_mps: Array
     lat_deg: Array
     lon_deg: Array
-
-    def part(self, which: Any) -> "Fixes":
-        """Some of them."""
-        return Fixes(self.time_s[which], self.speed_mps[which], self.lat_deg[which], self.lon_deg[which])
 
     @property
     def have_places(self) -> bool:
@@ -245,7 +241,7 @@ def _drives(recorded: Recorded, measured: MeasuredProfile | None) -> tuple[list[
     outside = readings.present.copy()
     for begin_s, end_s in stretches(readings.time_s, readings.present, fixes.time_s, fixes.speed_mps,
                                     config.gps.bridge_s, config.pipeline.drive_end_s, config.pipeline.stationary_mps):
-        inside = fixes.part((fixes.time_s >= begin_s) & (fixes.time_s <= end_s))
+        inside = fixes.of((fixes.time_s >= begin_s) & (fixes.time_s <= end_s))
         if len(inside.time_s) < 2:
             continue
         seconds["driven"] += inside.time_s[-1] - inside.time_s[0]
@@ -304,7 +300,7 @@ def _on_profile(recorded: Recorded, fixes: Fixes, along_m: Array, one: along_tra
                 ) -> _Drive | None:
     """A pass, laid on the profile's distance and cut to it; None for one that is too short."""
     part = slice(one.first, one.last)
-    fixes, along_m = fixes.part(part), along_m[part]
+    fixes, along_m = fixes.of(part), along_m[part]
     ahead_m = recorded.config.gps.antenna_behind_front_axle_m
     places = along_track.Observations(fixes.time_s, along_m + ahead_m, np.full(len(along_m), along_track.GPS_PLACE_M))
     grid, accel, usable = readings = _readings(recorded, fixes)
@@ -465,4 +461,4 @@ def _fixes_of_dump(kept: Any, later_s: float) -> Fixes:
         (timed.t_us / US_PER_S, np.nan if timed.fix.time_of_day_us is None else timed.fix.time_of_day_us / US_PER_S,
          timed.fix.speed_mps, timed.fix.lat_deg, timed.fix.lon_deg) for timed in whole], dtype=float).reshape(-1, 5).T
     time_s = fix_times_s(placed_s, named_s) - later_s
-    return Fixes(time_s, speed_mps, lat_deg, lon_deg).part(apart(time_s))
+    return Fixes(time_s, speed_mps, lat_deg, lon_deg).of(apart(time_s))

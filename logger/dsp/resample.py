@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from logger.arrays import Array, Bools
+from logger.arrays import Array, Bools, Rows
 from logger.dsp.filters import kaiser_half_length, low_pass_taps
 from logger.units import US_PER_S
 
@@ -55,22 +55,12 @@ class GridRun:
 
 
 @dataclass(frozen=True)
-class _Readings:
+class _Readings(Rows):
     """Readings not yet done with, arrays (n,)."""
 
     t_us: Times
     values: Array
     clipped: Bools
-
-    def __len__(self) -> int:
-        return len(self.t_us)
-
-    def part(self, which: slice | Bools) -> "_Readings":
-        return _Readings(self.t_us[which], self.values[which], self.clipped[which])
-
-    def then(self, later: "_Readings") -> "_Readings":
-        return _Readings(np.concatenate([self.t_us, later.t_us]), np.concatenate([self.values, later.values]),
-                         np.concatenate([self.clipped, later.clipped]))
 
 
 _NO_READINGS = _Readings(np.empty(0, dtype=np.int64), np.empty(0), np.empty(0, dtype=np.bool_))
@@ -105,14 +95,14 @@ class GridResampler:
 
     def push(self, t_us: Times, values: Array, clipped: Bools) -> list[GridRun]:
         """More readings, arrays (n,) with times [us]; gives the runs that have become certain."""
-        new = _Readings(t_us, values, clipped).part(self._keep(t_us))
+        new = _Readings(t_us, values, clipped).of(self._keep(t_us))
         if not len(new):
             return []
         before_us = np.concatenate([self._held.t_us[-1:] if len(self._held) else new.t_us[:1], new.t_us[:-1]])
         gaps = np.flatnonzero(new.t_us - before_us > MAX_GAP_S * US_PER_S).tolist()
         runs = []
         for low, high in pairwise([0, *gaps, len(new)]):
-            self._held = self._held.then(new.part(slice(low, high)))
+            self._held = _Readings.joined([self._held, new.of(slice(low, high))])
             if high in gaps:
                 runs += self.flush()
         return runs + self._advance(ended=False)
@@ -158,7 +148,7 @@ class GridResampler:
         next_us = self._origin_us + self._made * US_PER_S // self._rate_hz
         following = int(np.searchsorted(t_us, next_us, side="right")) - 1
         spare = max(0, following + 1 - NODES)
-        self._held = self._held.part(slice(spare, None))
+        self._held = self._held.of(slice(spare, None))
         return [run]
 
     def _interpolated(self, grid_us: Times, new_start: bool) -> GridRun:

@@ -14,14 +14,14 @@ from math import nan, sqrt
 import numpy as np
 import numpy.typing as npt
 
-from logger.arrays import Array, Bools
+from logger.arrays import Array, Bools, Rows
 from logger.units import US_PER_S
 
 GOOD_SHARE = 0.8
 
 
 @dataclass(frozen=True)
-class GridSamples:
+class GridSamples(Rows):
     """Filtered samples on the time grid, arrays (n,).
 
     reading_mps2 is the vertical reading with gravity in it, before any filter; accel_mps2 the same without gravity;
@@ -46,25 +46,6 @@ class GridSamples:
     each_mps2: Array
     each_usable: Bools
     each_at_end: Array
-
-    def __len__(self) -> int:
-        return len(self.t_us)
-
-    def part(self, low: int, high: int) -> "GridSamples":
-        """Samples low..high-1."""
-        return GridSamples(*(getattr(self, name)[low:high] for name in self.__dataclass_fields__))
-
-    def chosen(self, keep: Bools) -> "GridSamples":
-        """The samples where ``keep`` (n,) is true."""
-        return GridSamples(*(getattr(self, name)[keep] for name in self.__dataclass_fields__))
-
-
-def joined(parts: list[GridSamples]) -> GridSamples:
-    """Consecutive samples as one; at least one part."""
-    if len(parts) == 1:
-        return parts[0]
-    names = GridSamples.__dataclass_fields__
-    return GridSamples(*(np.concatenate([getattr(part, name) for part in parts]) for name in names))
 
 
 @dataclass(frozen=True)
@@ -191,7 +172,7 @@ class WindowCutter:
         moving = speed_mps > 0.0
         standing = np.unique(index[~moving])
         if not moving.all():
-            samples, index = samples.chosen(moving), index[moving]
+            samples, index = samples.of(moving), index[moving]
             distance_m, speed_mps, bridged = distance_m[moving], speed_mps[moving], bridged[moving]
         if self._open is not None and self._open.key[2] in standing:
             self._open.stood = True
@@ -206,7 +187,7 @@ class WindowCutter:
                 first_m = start_m if whole else float(distance_m[low])
                 window = self._open = _Open((False, leg, number), int(samples.t_us[low]), first_m, whole)
                 window.stood = bool(number in standing)
-            window.add(samples.part(low, high), speed_mps[low:high], bridged[low:high])
+            window.add(samples.of(slice(low, high)), speed_mps[low:high], bridged[low:high])
             window.last_m = float(distance_m[high - 1])
         return finished
 
@@ -225,7 +206,7 @@ class WindowCutter:
                 finished += self._close(None, complete=True)
                 window = self._open = _Open((True, -1, number), int(samples.t_us[low]), None, whole=True)
             count = high - low
-            window.add(samples.part(low, high), np.zeros(count), np.zeros(count, dtype=np.bool_))
+            window.add(samples.of(slice(low, high)), np.zeros(count), np.zeros(count, dtype=np.bool_))
         return finished
 
     def break_off(self) -> list[Window]:

@@ -12,7 +12,7 @@ window included, so that a resonance which is narrower than the window biases no
 
 from base64 import b64decode, b64encode
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from struct import pack
 from typing import Any
@@ -21,7 +21,7 @@ from zlib import compress, decompressobj, error
 import numpy as np
 import numpy.typing as npt
 
-from logger.arrays import AT_ONCE, Array, Bools
+from logger.arrays import AT_ONCE, Array, Bools, Rows
 from logger.bounds import MOVING_MPS
 from logger.dsp.resample import PASS_OF_RATE
 
@@ -50,7 +50,7 @@ over each other by 1/6 (F. Harris, Proceedings of the IEEE 66, 1978)."""
 
 
 @dataclass(frozen=True, eq=False)
-class DriveSpectra:
+class DriveSpectra(Rows):
     """Blocks (b,) of one drive or several.
 
     speed_mps    mean of each, the window's squares its weights
@@ -68,22 +68,17 @@ class DriveSpectra:
     noise: Array
     drive: npt.NDArray[np.intp]
 
-    def __len__(self) -> int:
-        return len(self.speed_mps)
-
     def part(self, chosen: Bools | slice) -> "DriveSpectra":
         """Some of the blocks."""
-        return DriveSpectra(self.speed_mps[chosen], self.spread[chosen], self.power[chosen], self.noise[chosen],
-                            np.unique(self.drive[chosen], return_inverse=True)[1])
+        found = self.of(chosen)
+        return replace(found, drive=np.unique(found.drive, return_inverse=True)[1])
 
 
 def joined(drives: Sequence[DriveSpectra]) -> DriveSpectra:
     """Several drives together."""
     begins = np.cumsum([0, *(int(one.drive.max(initial=-1)) + 1 for one in drives[:-1])])
-    drive = [one.drive + begin for one, begin in zip(drives, begins, strict=True)]
-    speed, spread, power, noise = (np.concatenate([getattr(one, name) for one in drives])
-                                   for name in ("speed_mps", "spread", "power", "noise"))
-    return DriveSpectra(speed, spread, power, noise, np.concatenate(drive))
+    return DriveSpectra.joined([replace(one, drive=one.drive + begin)
+                                for one, begin in zip(drives, begins, strict=True)])
 
 
 @cache

@@ -88,12 +88,11 @@ class Stretch:
 
 @dataclass(frozen=True)
 class DelayInformation:
-    """What blocks tell: ``a`` (g, d, 3, 3), ``b`` (g, d, 3) and ``c`` (g,) by group and delay; ``gravity`` (3,) sum of
+    """What blocks tell: ``a`` (g, d, 3, 3) and ``b`` (g, d, 3) by group and delay; ``gravity`` (3,) sum of
     the blocks' mean readings; their number; ``log_likelihood`` (s,) of each of ``STRENGTHS``; the first blocks."""
 
     a: Array
     b: Array
-    c: Array
     gravity: Array
     blocks: int
     log_likelihood: Array
@@ -103,7 +102,7 @@ class DelayInformation:
     def none(cls) -> "DelayInformation":
         """Before the first block."""
         d = len(DELAYS_S)
-        return cls(np.zeros((GROUPS, d, 3, 3)), np.zeros((GROUPS, d, 3)), np.zeros(GROUPS), np.zeros(3), 0,
+        return cls(np.zeros((GROUPS, d, 3, 3)), np.zeros((GROUPS, d, 3)), np.zeros(3), 0,
                    np.zeros(len(STRENGTHS)))
 
 
@@ -139,12 +138,11 @@ value to twice that."""
 
 @dataclass(frozen=True)
 class BlockInformation:
-    """Information of one block: ``a`` (d, 3, 3), ``b`` (d, 3), ``c``, mean reading (3,), ``log_likelihood`` (s,); and
+    """Information of one block: ``a`` (d, 3, 3), ``b`` (d, 3), mean reading (3,), ``log_likelihood`` (s,); and
     what it was made of: ``rows`` X (d, k, 3), z (k,), t (k,)."""
 
     a: Array
     b: Array
-    c: float
     mean: Array
     log_likelihood: Array
     rows: Rows
@@ -163,7 +161,7 @@ def _weighed(known: DelayInformation, rows: Rows, mean: Array) -> BlockInformati
     weight, residual = np.ones(len(z)), z
     so_far = known.a.sum(axis=0), known.b.sum(axis=0)
     for _ in range(_ROUNDS):
-        a, b, _c = _sums(x, z, t_s, strength, weight)
+        a, b = _sums(x, z, t_s, strength, weight)
         index, w = _best(so_far[0] + a, so_far[1] + b, known.gravity + mean, known.blocks >= FEWEST_BLOCKS)
         residual = z - x[index] @ w
         weight = _weights(residual, t_s, strength, weight)
@@ -183,10 +181,9 @@ def with_block(known: DelayInformation, block: BlockInformation) -> DelayInforma
 
 
 def _added(known: DelayInformation, block: BlockInformation) -> DelayInformation:
-    sums = known.a.copy(), known.b.copy(), known.c.copy()
-    for total, part in zip(sums, (block.a, block.b, block.c), strict=True):
-        total[known.blocks % GROUPS] += part
-    return DelayInformation(*sums, known.gravity + block.mean, known.blocks + 1,
+    a, b, group = known.a.copy(), known.b.copy(), known.blocks % GROUPS
+    a[group], b[group] = a[group] + block.a, b[group] + block.b
+    return DelayInformation(a, b, known.gravity + block.mean, known.blocks + 1,
                             known.log_likelihood + block.log_likelihood)
 
 
@@ -199,7 +196,7 @@ def estimate(known: DelayInformation) -> DelayEstimate:
     if found is None:
         return DelayEstimate(reason="too little braking and accelerating, or the sensor does not feel it")
     delay_s, curved_std_s, index, w = found
-    others = [_lowest(a - known.a[g], b - known.b[g], known.gravity) for g in range(GROUPS) if known.c[g] > 0]
+    others = [_lowest(a - known.a[g], b - known.b[g], known.gravity) for g in range(min(known.blocks, GROUPS))]
     left_out = [other for other in others if other is not None]
     if len(left_out) < len(others):
         return DelayEstimate(reason="too little braking and accelerating to estimate the delay")
@@ -304,13 +301,12 @@ def _whitened(t_s: Array, strengths: Sequence[Strength], weight: Array, columns:
     return white, root + line
 
 
-def _sums(x: Array, z: Array, t_s: Array, strength: Strength, weight: Array) -> tuple[Array, Array, float]:
-    """A (d, 3, 3), b (d, 3) and c of a block."""
+def _sums(x: Array, z: Array, t_s: Array, strength: Strength, weight: Array) -> tuple[Array, Array]:
+    """A (d, 3, 3) and b (d, 3) of a block."""
     d, k, _ = x.shape
     (white,), _ = _whitened(t_s, [strength], weight, np.column_stack([z, x.transpose(1, 0, 2).reshape(k, d * 3)]))
     rows = white[:, 1:].reshape(k, d, 3)
-    return np.einsum("kdi,kdj->dij", rows, rows), np.einsum("kdi,k->di", rows, white[:, 0]), \
-        float(white[:, 0] @ white[:, 0])
+    return np.einsum("kdi,kdj->dij", rows, rows), np.einsum("kdi,k->di", rows, white[:, 0])
 
 
 def _log_likelihoods(residual: Array, t_s: Array, strengths: Sequence[Strength], weight: Array) -> Array:

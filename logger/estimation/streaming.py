@@ -199,12 +199,12 @@ class RoadEstimator:
         return self._pushed(self._readable(reading_mps2, usable, at_end, self._driven_share * distance_m))
 
     def _pushed(self, more: RoadSamples) -> list[WindowEstimate]:
-        waiting = self._waiting.then(more)
+        waiting = RoadSamples.joined([self._waiting, more])
         estimates: list[WindowEstimate] = []
         taken = len(waiting) // HOP_SAMPLES * HOP_SAMPLES
         for low in range(0, taken, HOP_SAMPLES):
-            estimates += self._hop(waiting.part(low, low + HOP_SAMPLES))
-        self._waiting = waiting.part(taken, len(waiting))
+            estimates += self._hop(waiting.of(slice(low, low + HOP_SAMPLES)))
+        self._waiting = waiting.of(slice(taken, None))
         return estimates
 
     def _readable(self, reading_mps2: Array, usable: Bools, at_end: Array, distance_m: Array) -> RoadSamples:
@@ -235,7 +235,7 @@ class RoadEstimator:
             self._samples = RoadSamples.unread(BLOCK_SAMPLES, first_m, step_m, self._reads)
             windows = ceil(first_m / (self._piece_m * self._pieces_per_window) - 1e-9)
             self._next = windows * self._pieces_per_window
-        self._samples = self._samples.part(len(fresh), BLOCK_SAMPLES).then(fresh)
+        self._samples = RoadSamples.joined([self._samples.of(slice(len(fresh), None)), fresh])
         self._beyond = np.concatenate([self._beyond[len(fresh):], np.zeros(len(fresh))])
         self.road.move_on(fresh)
         self._look_whether_parked(fresh)
@@ -251,7 +251,7 @@ class RoadEstimator:
     def _look_whether_parked(self, fresh: RoadSamples) -> None:
         """From the second hop of a stand on: in the first the car may still swing."""
         assert self._samples is not None
-        both = self._samples.part(BLOCK_SAMPLES - 2 * len(fresh), BLOCK_SAMPLES)
+        both = self._samples.of(slice(-2 * len(fresh), None))
         if both.distance_m[-1] > both.distance_m[0]:
             self.road.driven_off()
         elif both.read.all() and not both.at_end.any():

@@ -11,7 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from logger.arrays import Array, Bools, Complex
+from logger.arrays import Array, Bools, Complex, Rows
 from logger.dsp.resample import GRID_RATE_HZ
 
 RATE_HZ = float(GRID_RATE_HZ)
@@ -21,7 +21,7 @@ where those before and after it say as well that the car stands."""
 
 
 @dataclass(frozen=True)
-class RoadSamples:
+class RoadSamples(Rows):
     """Arrays as ``RoadEstimator.push`` takes them: the first three (n, k) for k readings per sample, the first of them
     at the sample and the others at even steps up to the next; ``distance_m`` (n,)."""
 
@@ -30,22 +30,10 @@ class RoadSamples:
     at_end: Array
     distance_m: Array
 
-    def __len__(self) -> int:
-        return len(self.distance_m)
-
     @property
     def read(self) -> Bools:
         """(n,) samples with a reading."""
         return np.asarray(self.usable.any(axis=1))
-
-    def part(self, low: int, high: int) -> RoadSamples:
-        """Samples ``low`` ... ``high - 1``."""
-        return RoadSamples(*(getattr(self, name)[low:high] for name in self.__dataclass_fields__))
-
-    def then(self, later: RoadSamples) -> RoadSamples:
-        """These and the ones after them."""
-        both = ((getattr(self, name), getattr(later, name)) for name in self.__dataclass_fields__)
-        return RoadSamples(*(np.concatenate(pair) for pair in both))
 
     @classmethod
     def unread(cls, count: int, until_m: float, step_m: float, reads: int) -> RoadSamples:

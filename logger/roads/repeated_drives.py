@@ -17,7 +17,7 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
-from logger.arrays import Array, Bools
+from logger.arrays import Array, Bools, Rows
 from logger.roads.sections import WindowErrors, errors_of_means
 
 Ints = npt.NDArray[np.intp]
@@ -40,7 +40,7 @@ def way_and_cell(key: npt.NDArray[np.int64]) -> tuple[Ints, Ints]:
 
 
 @dataclass(frozen=True, eq=False)
-class Passes:
+class Passes(Rows):
     """Passes of drives over cells (p,), sorted by cell: one row for each drive and cell.
 
     key           of the cell
@@ -61,11 +61,6 @@ class Passes:
     def own_variance(self) -> Array:
         """Of each, without what is common to all [(m/km)2]."""
         return self.iri_errors.std**2 - self.iri_errors.parts()[1] ** 2
-
-    def of(self, which: Bools) -> "Passes":
-        """Some of them, as marked (p,)."""
-        return Passes(self.key[which], self.drive[which], self.time_s[which], self.iri_m_per_km[which],
-                      self.iri_errors.of(np.flatnonzero(which)), self.known_m[which])
 
 
 def passes_of(way: Ints, start_m: Array, end_m: Array, drive: Ints, time_s: Array, iri: Array, errors: WindowErrors,

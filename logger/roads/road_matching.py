@@ -27,7 +27,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from logger.arrays import Array, Bools
+from logger.arrays import Array, Bools, Rows
 from logger.geodesy import EARTH_RADIUS_M
 
 Ints = npt.NDArray[np.intp]
@@ -42,7 +42,7 @@ _STEP_M = 10.0  # between points of a given line
 
 
 @dataclass(frozen=True, eq=False)
-class Trace:
+class Trace(Rows):
     """Windows of one drive that have a place, in order (n,).
 
     lat_deg, lon_deg    of their middles [degrees]
@@ -54,10 +54,6 @@ class Trace:
     lon_deg: Array
     distance_m: Array
     t_s: Array
-
-    def part(self, start: int, end: int) -> Trace:
-        """Windows from one to before another."""
-        return Trace(self.lat_deg[start:end], self.lon_deg[start:end], self.distance_m[start:end], self.t_s[start:end])
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,7 +240,7 @@ _ASIDE_M = 2.0  # what windows scatter aside beyond that: lanes, the car in its 
 
 
 @dataclass(frozen=True, eq=False)
-class Matched:
+class Matched(Rows):
     """Where the windows of a trace lie (n,).
 
     way        number of the way, NO_WAY: on none, DOUBTFUL: on one of several, and none is to be believed
@@ -556,10 +552,10 @@ def lay(network: RoadNetwork, traces: Sequence[Trace]) -> list[Matched]:
         parts: list[Matched] = []
         state = _UNKNOWN_ERROR
         for start, end in _laps(trace):
-            lap = trace.part(start, end)
+            lap = trace.of(slice(start, end))
             matched, state = match(network, lap, state)
             parts.append(_learned(network, lap, matched, founder))
-        found.append(_joined(parts))
+        found.append(Matched.joined(parts or [_nowhere(0)]))
         network.traces = founder + 1
     return found
 
@@ -595,11 +591,6 @@ def _laps(trace: Trace) -> list[tuple[int, int]]:
         if last[window] >= cuts[-1]:
             cuts.append(window)
     return [(start, end) for start, end in zip(cuts, [*cuts[1:], len(points)], strict=True) if end > start]
-
-
-def _joined(parts: Sequence[Matched]) -> Matched:
-    return Matched(*(np.concatenate([getattr(one, name) for one in parts] or [np.zeros(0)])
-                     for name in ("way", "along_m", "point", "aside_m")))
 
 
 ALONG, AGAINST = 1, -1

@@ -29,13 +29,13 @@ The IRI of a section is the mean of the rectified slope over it (ASTM E1926), so
 length; a window across a limit counts in both sections by its parts.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from math import log, pi
 
 import numpy as np
 import numpy.typing as npt
 
-from logger.arrays import ROUNDING, Array
+from logger.arrays import ROUNDING, Array, Rows
 from logger.units import INCH_PER_MILE_M_PER_KM
 
 Ints = npt.NDArray[np.intp]
@@ -45,7 +45,7 @@ _ERROR_ROUNDING = 0.0005 * (1 + 3**0.5)  # of a whole and three parts with three
 
 
 @dataclass(frozen=True, eq=False)
-class WindowErrors:
+class WindowErrors(Rows):
     """Standard errors of windows (n,) [m/km], whole and by their parts; NaN: not known.
 
     Logs of older programs have the whole alone. Then all of it counts as that of the level: this is what was measured
@@ -76,9 +76,6 @@ class WindowErrors:
             possible = (parts >= 0).all(axis=0) & (np.sqrt((parts**2).sum(axis=0)) <= self.std + _ERROR_ROUNDING)
         return (np.where(possible, self.level_std, self.std), np.where(possible, self.common_std, 0.0),
                 np.where(possible, self.place_std, 0.0))
-
-    def of(self, rows: Ints) -> "WindowErrors":
-        return WindowErrors(*(getattr(self, one.name)[rows] for one in fields(self)))
 
 
 def errors_of_means(errors: WindowErrors, iri: Array, at_m: Array, length_m: Array, window: Ints, piece_m: Array,
@@ -174,7 +171,7 @@ def ride_words(iri_m_per_km: float) -> str:
 
 
 @dataclass(frozen=True, eq=False)
-class SectionWindows:
+class SectionWindows(Rows):
     """Windows of one way (n,), in order, none over another; NaN: not known, or to stand in no mean.
 
     start_m, end_m           [m]
@@ -189,10 +186,6 @@ class SectionWindows:
     iri_m_per_km: Array
     iri_errors: WindowErrors
     mean_square: Array
-
-    def of(self, rows: npt.NDArray[np.intp]) -> "SectionWindows":
-        return SectionWindows(self.start_m[rows], self.end_m[rows], self.duration_s[rows], self.iri_m_per_km[rows],
-                              self.iri_errors.of(rows), self.mean_square[rows])
 
 
 @dataclass(frozen=True, eq=False)

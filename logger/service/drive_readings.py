@@ -21,7 +21,7 @@ from drivers.accelerometers.accelerometer import OtherSettings
 from drivers.readings import AccelerationBlock, Fix
 from logger.arrays import Array, Bools
 from logger.bounds import MOVING_MPS
-from logger.dsp.windows import GridSamples, joined
+from logger.dsp.windows import GridSamples
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.records import WindowRecord
 from logger.service.doubted_spans import JudgedDrive
@@ -145,7 +145,7 @@ class DriveReadings(JudgedDrive):
         if not self._parts:
             nothing, nowhere = np.empty(0), np.empty(0, dtype=np.bool_)
             return GridReadings(nothing, nothing, nowhere, nowhere)
-        samples = joined(self._parts)
+        samples = GridSamples.joined(self._parts)
         return GridReadings(samples.t_us / US_PER_S, samples.reading_mps2, samples.present & ~samples.interpolated,
                             samples.clipped)
 

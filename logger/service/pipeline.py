@@ -20,7 +20,7 @@ import numpy as np
 from drivers.readings import AccelerationBlock, Fix
 from logger.arrays import Array
 from logger.comfort.uncertain_ride import NO_FIGURES
-from logger.dsp.windows import GridSamples, Window, WindowCutter, joined, runs_of_equal
+from logger.dsp.windows import GridSamples, Window, WindowCutter, runs_of_equal
 from logger.estimation.drive_alignment import DriveAlignment
 from logger.estimation.drive_spectra import DRIVE_SPECTRA, SpectraKeeper
 from logger.estimation.rms_calibration import RmsRelation
@@ -248,16 +248,16 @@ class Pipeline(JudgedDrive):
     def _release(self, until_us: int | None) -> None:
         if not self._pending:
             return
-        waiting = joined(self._pending)
+        waiting = GridSamples.joined(self._pending)
         count = len(waiting) if until_us is None else int(np.searchsorted(waiting.t_us, until_us))
-        self._pending = [waiting.part(count, len(waiting))] if count < len(waiting) else []
+        self._pending = [waiting.of(slice(count, None))] if count < len(waiting) else []
         if count:
-            self._cut(waiting.part(0, count))
+            self._cut(waiting.of(slice(count)))
 
     def _cut(self, samples: GridSamples) -> None:
         travel = self.odometer.travel(samples.t_us)
         for low, high in runs_of_equal(np.where(travel.known, travel.leg, _BLIND)):
-            part = samples.part(low, high)
+            part = samples.of(slice(low, high))
             leg = int(travel.leg[low]) if travel.known[low] else _BLIND
             if leg != self._leg:
                 self._end_leg()

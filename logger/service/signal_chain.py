@@ -29,7 +29,7 @@ from logger.dsp.filters import BlockFilter, SectionRows, butterworth_sos, freque
 from logger.dsp.fixed_point import FixedFilter
 from logger.dsp.resample import GRID_RATE_HZ, Decimator, GridResampler, GridRun
 from logger.dsp.weightings.weighting import DELAY_SAMPLES, Weighting
-from logger.dsp.windows import GridSamples, Window, joined
+from logger.dsp.windows import GridSamples, Window
 from logger.estimation.sensor_noise import NoiseBelief, Sensor
 from logger.estimation.streaming import WindowEstimate
 from logger.units import US_PER_S
@@ -227,9 +227,9 @@ class SignalChain:
         self._early -= early
         weighted = weighted[early:]
         if self._unweighted is not None:
-            waiting = joined([self._unweighted, waiting])
-        self._unweighted = waiting.part(len(weighted), len(waiting))
-        return self._weighed(waiting.part(0, len(weighted)), weighted)
+            waiting = GridSamples.joined([self._unweighted, waiting])
+        self._unweighted = waiting.of(slice(len(weighted), None))
+        return self._weighed(waiting.of(slice(len(weighted))), weighted)
 
     def _overdue(self) -> list[GridSamples]:
         """The samples that still wait for the weighting, at the end of a run: it is fed the last value once more."""

@@ -63,7 +63,7 @@ def test_portions_do_not_matter(cuts: list[int], seed: int) -> None:
         cutter = WindowCutter(WINDOW_M, 5.0, STEP_US)
         windows = []
         for low, high in pairwise([0, *edges, count]):
-            windows += push(cutter, part.part(low, high), distance_m[low:high], speed_mps[low:high])
+            windows += push(cutter, part.of(slice(low, high)), distance_m[low:high], speed_mps[low:high])
         return windows + cutter.break_off()
 
     whole, portions = cut([]), cut(sorted(cuts))

@@ -42,7 +42,7 @@ def levels(iri: float, in_a_step: float, seed: int) -> np.ndarray:
         column = reading[part, None]
         samples = RoadSamples(column, np.ones(column.shape, bool), np.zeros(column.shape), SPEED_MPS * time_s[part])
         if last > COUNT and not found:
-            road.move_on(samples.part(COUNT - HOP, COUNT))
+            road.move_on(samples.of(slice(COUNT - HOP, COUNT)))
         block = Block(grid, samples.distance_m, SPACING_M, 50 * SPACING_M)
         road.solved(block, samples, read)
         seen = np.flatnonzero(block.seen(read))

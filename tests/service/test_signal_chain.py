@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 
 from drivers.readings import AccelerationBlock
 from logger.dsp.weightings.wk import WEIGHTING
-from logger.dsp.windows import GridSamples, joined
+from logger.dsp.windows import GridSamples
 from logger.service.signal_chain import Axis, SignalChain
 
 G = 9.80665
@@ -37,7 +37,7 @@ def through(chain: SignalChain, samples: AccelerationBlock, cuts: list[int]) -> 
     for low, high in pairwise(edges):
         part = AccelerationBlock(samples.t_us[low:high], samples.accel_mps2[low:high], samples.clipped[low:high])
         out += chain.push(part)
-    return joined(out + chain.flush())
+    return GridSamples.joined(out + chain.flush())
 
 
 def chain_for(oversample: int = 1, axis: str = "+z") -> SignalChain:
@@ -124,7 +124,7 @@ def test_one_missing_sample_is_rebuilt_and_said() -> None:
 
 def test_a_silent_sensor_is_missing_from_the_grid_and_what_comes_too_late_is_counted() -> None:
     chain = chain_for()
-    absent = joined(chain.advance(1_000_000, 10_000_000))
+    absent = GridSamples.joined(chain.advance(1_000_000, 10_000_000))
     assert not absent.present.any()
     assert absent.t_us[0] == 1_000_000
     late = block(np.array([5_000_000, 5_010_000, 9_000_000, 9_010_000], dtype=np.int64), np.full(4, G))
