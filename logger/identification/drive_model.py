@@ -18,14 +18,13 @@ from logger.arrays import Array, Complex
 from logger.identification.unknown_inputs import (
     SPEED_SCALE,
     Obstacle,
-    ObstaclePath,
     RoadInput,
     changed_input,
     check_names,
     is_input,
     read_input,
 )
-from logger.profiles.track import Alterations, Stance, Track, Way, WheelTracks, along_paths
+from logger.profiles.track import Alterations, Stance, Track, Way, WheelTracks
 from logger.roads.iso8608 import displacement_psd
 from logger.runs import SLOWEST_MPS, Run
 from logger.simulation.virtual_drive import SimulatedRuns, steps_hz
@@ -201,8 +200,10 @@ class _TrackWithObstacles:
         return replace(self, track=self.track.as_it_is(surface, actuators))
 
     def under_wheels(self, way: Way, stance: Stance) -> tuple[Array, Array]:
-        """As ``WheelTracks``."""
-        parts = [self.track.under_wheels(way, stance),
-                 *(along_paths([ObstaclePath(one, stance.contact_patch_m)], way, stance) for one in self.obstacles)]
+        """As ``WheelTracks``; obstacles that no wheel meets are left out, as their roundings would pass for effects."""
+        patch_m, at_m = stance.contact_patch_m, way.distance_m
+        met = [one.track for one in self.obstacles if at_m.max() > one.track.start_m - patch_m
+               and at_m.min() - stance.behind_m.max() < one.track.end_m + patch_m]
+        parts = [one.under_wheels(way, stance) for one in (self.track, *met)]
         elevations, means = (np.sum(some, axis=0) for some in zip(*parts, strict=True))
         return elevations, means

@@ -7,28 +7,24 @@
 They hold for every run. ``run2.bump.start_m`` is that of the second run alone, and ``each.bump.start_m`` stands for one
 per run.
 
-A speed bump and a step are there as tires meet them, in closed form.
-
-Problem: an obstacle whose height, width or place is to be found moves a little with every step of a fit, and a profile
-of samples would move in jumps. Solution: a tire's average over its patch, and the mean of that over a step of the way,
-are differences of the shape's first and second integral along the road. Both have formulas; nothing is sampled.
-
-What passes is described as ``TirePath`` does it: an elevation at each place, and a mean from each place to the next.
+Problem: an obstacle whose height, width or place is to be found moves a little with every step of a fit, and samples of
+a profile would move in jumps. Solution: an obstacle is a track of its own, whose samples move and stretch with it.
 """
 
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from logger.arrays import Array
-from logger.profiles.track import POINT_M
+from logger.profiles.track import Track
+from logger.roads.obstacles import speed_bump
 from logger.vehicle.named_parameters import WEAKEST, Free
 
-# A shorter patch is taken for one of this length [m].
-_LEAST_PATCH_M = 1e-3
+_PIECES, _EDGE_M = 2000, 1e-3
+"""Straight lines that a bump consists of: they lie within a millionth of its height of it. How far a step rises [m]."""
 # 38.1 mm of 4.4.5 and 150 mm by 2.60 m of 4.4.3 are usual; these are not.
 LARGEST_HEIGHT_M = 1.0
 LARGEST_WIDTH_M = 50.0
@@ -44,7 +40,6 @@ class Bump:
     start_m: float
     height_m: float
     width_m: float
-    after = 0.0
 
     def __post_init__(self) -> None:
         _check_height(self.height_m)
@@ -56,12 +51,11 @@ class Bump:
         """From where it begins to where the road is as it will stay [m]."""
         return self.width_m
 
-    def integrals(self, x: Array) -> tuple[Array, Array]:
-        """First and second integral (n,) of its height, over the height, up to places (n,) beyond its start [m, m2]."""
-        cut, wave = np.clip(x, 0.0, self.width_m), self.width_m / (2 * np.pi)
-        beyond = 0.5 * self.width_m * (np.maximum(x, cut) - cut)
-        return (0.5 * (cut - wave * np.sin(cut / wave)),
-                0.25 * cut**2 + 0.5 * wave**2 * (np.cos(cut / wave) - 1) + beyond)
+    @cached_property
+    def track(self) -> Track:
+        """The bump on a flat road."""
+        along_m = np.linspace(0.0, self.width_m, _PIECES + 1)
+        return Track(self.width_m / _PIECES, speed_bump(along_m, 0.0, self.height_m, self.width_m), self.start_m)
 
 
 @dataclass(frozen=True)
@@ -71,45 +65,17 @@ class RoadStep:
     start_m: float
     height_m: float
     length_m = 0.0
-    after = 1.0
 
     def __post_init__(self) -> None:
         _check_height(self.height_m)
 
-    def integrals(self, x: Array) -> tuple[Array, Array]:
-        """As of ``Bump``."""
-        return np.maximum(x, 0.0), 0.5 * np.maximum(x, 0.0) ** 2
+    @cached_property
+    def track(self) -> Track:
+        """The step on a flat road."""
+        return Track(_EDGE_M, np.array([0.0, self.height_m]), self.start_m - _EDGE_M / 2)
 
 
 Obstacle = Bump | RoadStep
-
-
-@dataclass(frozen=True)
-class ObstaclePath:
-    """What tires of a patch [m] meet of an obstacle on a flat road."""
-
-    obstacle: Obstacle
-    patch_m: float
-
-    def step_means(self, distance_m: Array) -> tuple[Array, Array]:
-        """As ``TirePath.step_means``: elevation (N,) and mean (N - 1,) from each place to the next [m]."""
-        one, half = self.obstacle, max(self.patch_m, _LEAST_PATCH_M) / 2
-        along = distance_m - one.start_m
-        low, high = np.minimum(along[:-1], along[1:]), np.maximum(along[:-1], along[1:])
-        near = (high > -half) & (low < one.length_m + half)
-        elevation = np.where(along > one.length_m / 2, one.after, 0.0)
-        mean = np.where(low > one.length_m / 2, one.after, 0.0)
-        if near.any():
-            part = slice(int(np.argmax(near)), len(near) - int(np.argmax(near[::-1])) + 1)
-            x = along[part]
-            at, area = ((front - rear) / (2 * half)
-                        for front, rear in zip(one.integrals(x + half), one.integrals(x - half), strict=True))
-            step = np.diff(x)
-            short = np.abs(step) < POINT_M
-            elevation[part] = at
-            mean[part.start : part.stop - 1] = np.where(short, (at[1:] + at[:-1]) / 2,
-                                                        np.diff(area) / np.where(short, 1, step))
-        return one.height_m * elevation, one.height_m * mean
 
 
 def _check_height(height_m: float) -> None:

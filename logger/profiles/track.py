@@ -11,7 +11,6 @@ Then the average over the patch is made of parabolas, and the integral of that a
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar, Protocol
@@ -26,13 +25,6 @@ from logger.arrays import ROUNDING, Array
 POINT_M = 1e-4
 MOST_STEPS = 5_000_000  # what a simulation may hold in memory at once
 _KEPT_PATHS = 3
-
-
-class WheelPath(Protocol):
-    """What the tires of one side meet."""
-
-    def step_means(self, distance_m: Array) -> tuple[Array, Array]:
-        """As ``TirePath``."""
 
 
 class Stance(Protocol):
@@ -92,13 +84,6 @@ class WheelTracks(Protocol):
         records."""
 
 
-def along_paths(paths: Sequence[WheelPath], way: Way, stance: Stance) -> tuple[Array, Array]:
-    """As ``WheelTracks``, of the paths of a road, left and right: each wheel meets it where it stands."""
-    wheels = [(paths[-1] if left_m < 0 else paths[0]).step_means(way.distance_m - behind_m)
-              for behind_m, left_m in zip(stance.behind_m, stance.left_m, strict=True)]
-    return np.stack([one for one, _ in wheels], axis=1), np.stack([mean for _, mean in wheels], axis=1)
-
-
 @dataclass(frozen=True, eq=False)
 class Track:
     """One or two wheel tracks along a road.
@@ -147,7 +132,11 @@ class Track:
         return self.elevation_m.ndim == 2
 
     def under_wheels(self, way: Way, stance: Stance) -> tuple[Array, Array]:
-        return along_paths(self.tire_paths(stance.contact_patch_m), way, stance)
+        """As ``WheelTracks``: each wheel meets the road where it stands."""
+        paths = self.tire_paths(stance.contact_patch_m)
+        wheels = [(paths[-1] if left_m < 0 else paths[0]).step_means(way.distance_m - behind_m)
+                  for behind_m, left_m in zip(stance.behind_m, stance.left_m, strict=True)]
+        return np.stack([one for one, _ in wheels], axis=1), np.stack([mean for _, mean in wheels], axis=1)
 
     def as_it_is(self, surface: Alterations, actuators: Alterations) -> Track:
         """As ``WheelTracks``."""

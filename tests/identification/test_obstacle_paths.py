@@ -1,4 +1,4 @@
-"""Obstacles in closed form: against quadrature and against densely sampled profiles."""
+"""Obstacles as tires meet them: against quadrature and against densely sampled profiles."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import numpy.typing as npt
 import pytest
 from scipy.integrate import quad
 
-from logger.identification.unknown_inputs import Bump, Obstacle, ObstaclePath, RoadStep
+from logger.identification.unknown_inputs import Bump, Obstacle, RoadStep
 from logger.profiles.track import Track
 
 Array = npt.NDArray[np.float64]
@@ -26,7 +26,7 @@ def height(one: Obstacle, x: float) -> float:
 @pytest.mark.parametrize("one", OBSTACLES)
 @pytest.mark.parametrize("patch_m", [0.05, 0.25])
 def test_against_quadrature(one: Obstacle, patch_m: float) -> None:
-    path = ObstaclePath(one, patch_m)
+    path, = one.track.tire_paths(patch_m)
     edges = [one.start_m, one.start_m + one.length_m]
 
     def averaged(x: float) -> float:
@@ -35,7 +35,7 @@ def test_against_quadrature(one: Obstacle, patch_m: float) -> None:
 
     places = np.array([one.start_m - 1, one.start_m - 0.1, one.start_m + 0.02, one.start_m + 0.11, 5.0, 5.2, 7.0])
     elevation, mean = path.step_means(places)
-    assert elevation == pytest.approx([averaged(x) for x in places], abs=1e-9)
+    assert elevation == pytest.approx([averaged(x) for x in places], abs=1e-6 * abs(one.height_m))
     for low, high, reported in zip(places[:-1], places[1:], mean, strict=True):
         x = np.linspace(low, high, 2001)
         assert reported == pytest.approx(np.trapezoid([averaged(one) for one in x[::20]], x[::20]) / (high - low),
@@ -46,7 +46,7 @@ def test_against_quadrature(one: Obstacle, patch_m: float) -> None:
 def test_against_a_dense_profile(one: Obstacle) -> None:
     place = np.arange(-5.0, 12.0, 0.0005)
     dense = Track(0.0005, np.array([height(one, x) for x in place]), place[0]).tire_paths(0.25)[0]
-    for reported, expected in zip(ObstaclePath(one, 0.25).step_means(WAY), dense.step_means(WAY), strict=True):
+    for reported, expected in zip(one.track.tire_paths(0.25)[0].step_means(WAY), dense.step_means(WAY), strict=True):
         assert reported == pytest.approx(expected, abs=3e-4 * abs(one.height_m) / 0.25)
 
 
