@@ -8,6 +8,7 @@ characters at most, and a cell that a spreadsheet would compute begins with an a
 """
 
 import re
+from collections.abc import Callable
 from typing import Any
 
 LONGEST_WORD = 80
@@ -98,3 +99,11 @@ def _shown(character: str) -> str:
 def percent(share: float) -> str:
     """A share of a power, for a sentence."""
     return f"{share:.0%}" if share >= 0.095 else f"{100 * share:.1f}%" if share >= 0.001 else "less than 0.1%"
+
+
+Notify = Callable[[str], None]
+"""Takes a message on the progress of some work."""
+
+
+def silent(*_said: object) -> None:
+    """Ignore what is said."""

@@ -43,7 +43,7 @@ from typing import (
 )
 
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput
-from logger.printable import LONGEST_WORD
+from logger.printable import LONGEST_WORD, Notify, silent
 
 
 class Range(NamedTuple):
@@ -220,17 +220,11 @@ P = ParamSpec("P")
 R = TypeVar("R")
 Asked = TypeVar("Asked")
 
-Notify = Callable[[str], None]
-"""Takes a message on the progress of some work."""
 _UNIT = re.compile(r"_(hz|s|m|kg|cm3|mps2?|m_per_km)$")
 """Ends of fields' names that are units: an option is called without."""
 
 _IN_PYTHON = "\nIn Python: "
 """Where the part of a question's docstring begins that is of no use at the terminal."""
-
-
-def silent(*_said: object) -> None:
-    """Ignore what is said."""
 
 
 @dataclass(frozen=True)

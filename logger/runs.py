@@ -376,16 +376,6 @@ def normalised_rms_error(runs: Sequence[Run], predictions: Sequence[Array]) -> f
                           [run.kept_readings_mps2 for run in runs])
 
 
-def signal_errors(runs: Sequence[Run], predictions: Sequence[Array]) -> dict[str, float]:
-    """The same of every other signal, by name; predictions ((1 + s) n,) per run."""
-    parts: dict[str, list[tuple[Array, Array]]] = {}
-    for run, one in zip(runs, predictions, strict=True):
-        for signal, measured, predicted in zip(run.signals, run.more, one.reshape(-1, run.count)[1:], strict=True):
-            parts.setdefault(signal.name, []).append((measured[run.first:], predicted[run.first:]))
-    return {name: normalised_rms([measured - predicted for measured, predicted in some], [one for one, _ in some])
-            for name, some in parts.items()}
-
-
 def normalised_rms(residuals: Sequence[Array], measured: Sequence[Array]) -> float:
     """rms(residuals) / rms(measured) over all samples of arrays (n,); NaN where nothing but zeros was measured."""
     left, whole = (sum(float((part**2).sum()) for part in parts) for parts in (residuals, measured))

@@ -36,8 +36,7 @@ from logger.extraction.recorded_columns import (
     way_over_speed,
 )
 from logger.left_out import LeftOut
-from logger.printable import counted, word
-from logger.question import Notify, silent
+from logger.printable import Notify, counted, silent, word
 from logger.runs import RecordFacts
 from logger.service import wiring
 from logger.service.config import Config

@@ -16,22 +16,14 @@ from logger.api.shared_fields import named_numbers
 from logger.api.shown import CommandResult, checks_json, checks_lines
 from logger.chart_data import Array, Chart, Curves, Line
 from logger.errors import BadInput, as_bad_input
-from logger.estimation.batch import (
-    RESOLVED_SHARE,
-    SPEED_CLASS_MPS,
-    Assessment,
-    Unusable,
-    assess,
-    estimable,
-    figures,
-    speed_classes,
-)
+from logger.estimation import batch
 from logger.estimation.rms_calibration import LEVELS_IRI
 from logger.estimation.sensor_noise import NOISE_MPS2, Sensor
 from logger.files import write_text
+from logger.printable import Notify, silent
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
-from logger.question import Notify, function, silent
+from logger.question import function
 from logger.report.blocks import Block, Blocks, Hint, Lines, Table
 from logger.report.quantities import known, numbers_of
 from logger.roads.iri import doubt_of
@@ -70,7 +62,7 @@ class Estimate(CommandResult):
     doubts               what may be wrong with the drive's record, a line each
     """
 
-    found: Assessment
+    found: batch.Assessment
     mean_iri_m_per_km: float
     edges_m: Array
     speed_mps: Array
@@ -142,7 +134,7 @@ def sensor_of(run: Run, noise_mps2: float | str | None = None, step_mps2: float 
 
 
 def assessed(run: Run, model: vehicle_file.CarModel, sensor: Sensor, learns_noise: bool, window_m: float,
-             warn: Notify = silent, anyway: bool = False) -> Assessment:
+             warn: Notify = silent, anyway: bool = False) -> batch.Assessment:
     """The road of a run, in windows; where the noise is to be learned, the sensor's is a guess. BadInput ("file:line:
     expected ...") for a drive that cannot be used, and for a profile of another road, unless the user wants to go on
     ``anyway`` (then ``warn`` is called)."""
@@ -150,13 +142,13 @@ def assessed(run: Run, model: vehicle_file.CarModel, sensor: Sensor, learns_nois
         raise BadInput(f"{run.path}: expected a drive over a road, found a run that is driven by time")
     road = None if run.profile is None else drive_file.track_of(run.profile)
     try:
-        ready = estimable(run.rate_hz, run.accel_z_mps2, run.speed_mps, run.distance_m, bounds.SPEED.largest)
-    except Unusable as error:
+        ready = batch.estimable(run.rate_hz, run.accel_z_mps2, run.speed_mps, run.distance_m, bounds.SPEED.largest)
+    except batch.Unusable as error:
         raise BadInput(f"{run.file}{'' if error.sample is None else f':{error.sample + 2}'}: {error}") from None
     if road is not None:
         _check_road(run, ready.distance_m, road, model, warn, anyway)
     with as_bad_input(model.vehicle.name):
-        return assess(ready, model.vehicle, sensor, window_m, road, learns_noise, model.effects, model.errors)
+        return batch.assess(ready, model.vehicle, sensor, window_m, road, learns_noise, model.effects, model.errors)
 
 
 def _check_road(run: Run, distance_m: Array, road: Track, model: vehicle_file.CarModel, warn: Notify,
@@ -177,7 +169,7 @@ _G_NEAR, _G_CALM_MPS2 = 0.1, 0.5
 # --- for programs ---
 
 
-def as_json(run: str, found: Assessment) -> dict[str, Any]:
+def as_json(run: str, found: batch.Assessment) -> dict[str, Any]:
     """Settings, the run as a whole, per class of speed, per window; null for what is not known.
 
     run    as the user knows it
@@ -192,18 +184,18 @@ def as_json(run: str, found: Assessment) -> dict[str, Any]:
         "distance_start_m": float(drive.distance_m[0]), "distance_end_m": float(drive.distance_m[-1]),
         "distance_moved_m": drive.moved_m, "compared": found.compared,
         **({"road_effects": list(found.road_effects)} if found.road_effects else {}),
-        **figures(found, windows.speed_mps > 0),
+        **batch.figures(found, windows.speed_mps > 0),
         "unanswered": dict(Counter("|".join(sorted(flags)) for flags in windows.flags if flags)),
         "shortest_wavelength_m": road.shortest_m if road else None,
         "longest_wavelength_m": road.longest_m if road else None,
         "profile_files": [],
-        "speeds": [{"from_mps": low, "to_mps": low + SPEED_CLASS_MPS, **figures(found, which)}
-                   for low, which in speed_classes(windows)],
+        "speeds": [{"from_mps": low, "to_mps": low + batch.SPEED_CLASS_MPS, **batch.figures(found, which)}
+                   for low, which in batch.speed_classes(windows)],
         "windows": list(_rows(found)),
     }
 
 
-def _rows(found: Assessment) -> Iterator[dict[str, Any]]:
+def _rows(found: batch.Assessment) -> Iterator[dict[str, Any]]:
     windows = found.windows
     columns = {
         "distance_start_m": windows.edges_m[:-1], "distance_end_m": windows.edges_m[1:],
@@ -216,7 +208,7 @@ def _rows(found: Assessment) -> Iterator[dict[str, Any]]:
         yield row | {"flags": sorted(flags)}
 
 
-def window_lines(found: Assessment) -> Iterator[str]:
+def window_lines(found: batch.Assessment) -> Iterator[str]:
     """The windows as CSV."""
     for number, row in enumerate(_rows(found)):
         if number == 0:
@@ -228,7 +220,7 @@ def window_lines(found: Assessment) -> Iterator[str]:
 # --- for a person ---
 
 
-def blocks(found: Assessment, summary: dict[str, Any]) -> Iterator[Block]:
+def blocks(found: batch.Assessment, summary: dict[str, Any]) -> Iterator[Block]:
     """What a person sees; ``summary``: the same as JSON."""
     way_m = summary["distance_end_m"] - summary["distance_start_m"]
     details = [
@@ -280,7 +272,7 @@ def _sensor_lines(summary: dict[str, Any]) -> list[str]:
     return [f"Learned from the drive: {shown}", f"Assumed: {rounded}"]
 
 
-def _unit_hint(found: Assessment) -> str:
+def _unit_hint(found: batch.Assessment) -> str:
     """What makes one doubt that the readings on the way are in m/s2; empty if nothing does."""
     drive = found.drive
     moving = np.diff(drive.distance_m, prepend=drive.distance_m[0]) * drive.rate_hz > SLOWEST_MPS
@@ -300,12 +292,12 @@ def _unanswered(summary: dict[str, Any]) -> str:
     return ", ".join(f"{count} {flags.replace('|', ' and ')}" for flags, count in summary["unanswered"].items())
 
 
-def _range_words(found: Assessment) -> str:
+def _range_words(found: batch.Assessment) -> str:
     road = found.road
     if road is None:
-        return f"none over {RESOLVED_SHARE:.0%} of the drive."
+        return f"none over {batch.RESOLVED_SHARE:.0%} of the drive."
     left_out = f"; {road.left_out_m:.0f} m in short stretches are left out" if road.left_out_m else ""
-    return (f"{road.shortest_m:.2g} to {road.longest_m:.3g} m (over {RESOLVED_SHARE:.0%} of the drive); "
+    return (f"{road.shortest_m:.2g} to {road.longest_m:.3g} m (over {batch.RESOLVED_SHARE:.0%} of the drive); "
             f"the profile holds no others{left_out}.")
 
 

@@ -24,7 +24,7 @@ from logger.extraction.along_track import registered
 from logger.extraction.recorded_columns import fix_times_s, stretches
 from logger.files import make_folder, remove_file, together
 from logger.left_out import LeftOut, counting
-from logger.question import Notify, silent
+from logger.printable import Notify, silent
 from logger.runs import BY_RECEIVER, BY_ROAD, CLIPPED, LEAST_S, NO_READING, READING, RecordFacts, Run
 from logger.service import wiring
 from logger.service.config import Config

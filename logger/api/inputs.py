@@ -16,9 +16,9 @@ from logger.chart_data import Array, Chart, Curves, line
 from logger.dsp.channel_faults import released_at
 from logger.errors import BadInput, as_bad_input
 from logger.files import make_folder, together
+from logger.printable import Notify, silent
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
-from logger.question import Notify, silent
 from logger.report.quantities import numbers_of, unit_of
 from logger.runs import UNKNOWN, Past, past_of
 from logger.shipped import vehicle_names, vehicle_path

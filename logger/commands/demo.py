@@ -30,7 +30,7 @@ from logger.commands.replay import ReplayQuestion, replayed
 from logger.demo import BEYOND, CAR, DRIVES, FIELD, FOURTH, LAB, LINE, TrueCar
 from logger.errors import EXIT_DONE, BadInput
 from logger.files import make_folder, together, write_file, write_text
-from logger.question import silent
+from logger.printable import silent
 from logger.report.quantities import columns, wrapped
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 from logger.api.lab.question import LAB, LabLoopQuestion, LabQuestion
 from logger.commands.options import asked, declare, help_of, keep_freed_memory, progress, respelled
 from logger.errors import EXIT_DONE, BadInput
-from logger.question import silent
+from logger.printable import silent
 
 if TYPE_CHECKING:
     from logger.api.lab.bench import Bench

@@ -14,7 +14,13 @@ import numpy as np
 
 from logger.arrays import Array
 from logger.bounds import DISCREPANCY
-from logger.lab.likelihood.noise_floor import Repeats, find_repeats, floor_error, sensor_noise_with_rounding
+from logger.lab.likelihood.noise_floor import (
+    Repeats,
+    find_repeats,
+    floor_error,
+    sensor_noise_with_rounding,
+    signals_with_noise,
+)
 from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
@@ -26,7 +32,7 @@ from logger.lab.residuals.force_gain import force_gain
 from logger.lab.residuals.unexplained import Removed, removed_from
 from logger.lab.selection.holdout import REFITTED, ErrorStep, as_filed, cross_validate
 from logger.lab.selection.starts import fitted_from_starts
-from logger.runs import normalised_rms_error, signal_errors
+from logger.runs import normalised_rms_error
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import Car, Response, compose
 from logger.vehicle.effect import Chosen
@@ -44,12 +50,14 @@ class Standing:
     signals: Mapping[str, float]
 
     @staticmethod
-    def of(runs: SimulatedRuns, car: Car, predictions: Sequence[Array], responses: Sequence[Response]) -> "Standing":
+    def of(posterior: Posterior, car: Car, predictions: Sequence[Array], responses: Sequence[Response]) -> "Standing":
         """The standing of a car with these predictions and motions."""
-        main = [run.main(one) for run, one in zip(runs.runs, predictions, strict=True)]
-        residuals = ModelResiduals(runs.runs, car, main, responses)
-        return Standing(residuals, normalised_rms_error(runs.runs, main), breakdown(residuals),
-                        signal_errors(runs.runs, predictions))
+        runs = posterior.runs.runs
+        main = [run.main(one) for run, one in zip(runs, predictions, strict=True)]
+        residuals = ModelResiduals(runs, car, main, responses)
+        signals = signals_with_noise(posterior, posterior.residuals_of(predictions))
+        return Standing(residuals, normalised_rms_error(runs, main), breakdown(residuals),
+                        {name: error for name, (error, _) in signals.items() if name})
 
 
 @dataclass(frozen=True, eq=False)
@@ -118,13 +126,14 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
     ValueError when the vehicle lacks what an effect needs.
     """
     car = compose(vehicle, effects)
-    plain = Standing.of(runs, car, runs.predict(car), runs.respond(car))
     posterior = Posterior(runs, given or vehicle, tolerance or Tolerance(), vehicle)
+    plain = Standing.of(posterior, car, runs.predict(car), runs.respond(car))
     names = posterior.prior.names
     linear = fitted_from_starts(posterior, effects)
     state = linear.state
     car = posterior.car(state.effects, state.logs)
-    refitted = Standing.of(runs, car, state.predictions, runs.respond(car, posterior.distance_error_m(state.record)))
+    refitted = Standing.of(posterior, car, state.predictions,
+                           runs.respond(car, posterior.distance_error_m(state.record)))
     removed, errors = removed_from(posterior, plain.residuals.predictions, state), standard_errors(linear)
     moves = {name: float(np.expm1(log)) for name, log in zip(names, state.logs, strict=True)}
     for before, after in zip(effects, state.effects, strict=True):

@@ -46,13 +46,12 @@ from logger.lab.selection.holdout import REFITTED, ErrorStep, HoldOut, as_filed,
 from logger.lab.selection.screening import Baseline, Screened, effects_without, misalignment
 from logger.lab.selection.starts import UnknownNumbers, needs_starts
 from logger.lab.selection.stepwise import F, M, MeasuredRoad, P, Search, SearchEffort, Selection, is_outside_data
+from logger.printable import Notify, silent
 from logger.runs import BY_ROAD, Past, are_on_rig
 from logger.simulation.virtual_drive import steps_hz
 from logger.vehicle import named_parameters
 from logger.vehicle.effect import Chosen, Effect, SensorEffect
 from logger.vehicle.named_parameters import free_parameters_of
-
-Progress = Callable[[str], None]
 
 ALREADY_PRESENT = "the model has it"
 LAID_BY_THE_ROAD = ("ridelog extract has already shifted these runs to fit the road (run.yaml says by how much)")
@@ -255,14 +254,14 @@ class Searched:
 
 
 def diagnose(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
-             progress: Progress = lambda words: None, last: Mapping[str, Effect] = MappingProxyType({})
+             progress: Notify = silent, last: Mapping[str, Effect] = MappingProxyType({})
              ) -> LabDiagnosis:
     """The diagnosis of ``search_to_the_last``."""
     return search_to_the_last(posterior, effects, present, progress, last).diagnosis
 
 
 def search_to_the_last(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen],
-                       progress: Progress, last: Mapping[str, Effect]) -> Searched:
+                       progress: Notify, last: Mapping[str, Effect]) -> Searched:
     """Find the effects of ``effects`` that the model, with those that are ``present``, lacks; where these leave
     something unexplained, also of those that are tried ``last``.
 
@@ -290,7 +289,7 @@ def search_to_the_last(posterior: Posterior, effects: Mapping[str, Effect], pres
 
 
 def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
-                   progress: Progress = lambda words: None) -> tuple[Search, Selection]:
+                   progress: Notify = silent) -> tuple[Search, Selection]:
     """The search of a diagnosis and its result; arguments as of ``diagnose``."""
     search, before = begin_search(posterior, effects, present, progress)
     return search, search.run(before)
@@ -303,7 +302,7 @@ def exceeds_noise(model: Baseline) -> bool:
 
 
 def begin_search(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
-                 progress: Progress = lambda words: None) -> tuple[Search, Baseline]:
+                 progress: Notify = silent) -> tuple[Search, Baseline]:
     """The search and the fitted model that it begins at; arguments as of ``diagnose``."""
     obstacles = obstacles_of(posterior, effects, present)
     tried = [one for name, one in effects.items() if name not in obstacles]
@@ -314,7 +313,7 @@ def begin_search(posterior: Posterior, effects: Mapping[str, Effect], present: S
     search: Search[Baseline, Screened, CandidateFit] = Search(
         tried, len(present), misalignment(posterior, nominal), progress,
         # Of a part, whose motion is given, fits take a hundredth of those of a car.
-        effort=SearchEffort(beginnings=2 * before.is_part) if unknown is None else SearchEffort(fitted=3),
+        effort=SearchEffort(beginnings=2 * posterior.vehicle.is_part) if unknown is None else SearchEffort(fitted=3),
         likelihood=unknown or MeasuredRoad())
     return search, before
 

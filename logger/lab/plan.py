@@ -34,16 +34,15 @@ a search; where it is not as linear as they say, derivatives are computed again.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import cached_property, partial, reduce
 from operator import add
 
 import numpy as np
-import numpy.typing as npt
 
-from logger.arrays import ROUNDING, Array
+from logger.arrays import ROUNDING, Array, Indices
 from logger.dsp.resample import GRID_RATE_HZ
 from logger.lab.diagnosis import obstacles_of
 from logger.lab.likelihood.distance_error import USUAL, ErrorSize
@@ -56,6 +55,7 @@ from logger.lab.likelihood.signals import JointBands, JointWhitener
 from logger.lab.likelihood.whittle import Whitener
 from logger.lab.selection.detectability import DETECTABLE_SIGMA, is_uninformative_at_usual
 from logger.lab.selection.evidence import INDISTINGUISHABLE
+from logger.printable import Notify, silent
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
 from logger.runs import LEAST_S, RecordFacts, Run, Signal
@@ -332,7 +332,6 @@ def _cut(road: Track, length_m: float) -> Track:
     return Track(road.spacing_m, road.elevation_m[:count], road.start_m)
 
 
-Indices = npt.NDArray[np.intp]
 
 ISOLABLE_SIGMA = float(np.sqrt(INDISTINGUISHABLE))
 """Two effects are distinguishable where so many standard deviations of the one remain after the other is fitted: their
@@ -591,8 +590,6 @@ def _deviance(there: LinearisedDrives, residuals: Sequence[Array], moved: Sequen
     return found
 
 
-Progress = Callable[[str], None]
-
 _LINEAR_SIGMA = 3.0
 """Below this detectability a refit without the effect is linear."""
 _LEAST_GAIN_SIGMA = 1.0
@@ -652,7 +649,7 @@ class LabPlan:
 
 def plan(there: PlannedCar, runs: Posterior | None, planned: Sequence[Run], effects: Mapping[str, Effect],
          noise: SensorNoise | None, usual_noise: SensorNoise, road: Track | None,
-         progress: Progress = lambda words: None) -> LabPlan:
+         progress: Notify = silent) -> LabPlan:
     """Analyse what runs and planned drives could show of ``effects``.
 
     there          the car; its numbers are fitted to the runs first

@@ -24,7 +24,7 @@ import numpy as np
 from drivers.catalogue import names
 from logger.chart_data import Chart
 from logger.errors import BadInput
-from logger.question import silent
+from logger.printable import silent
 
 
 class Word(StrEnum):

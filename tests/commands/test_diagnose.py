@@ -52,7 +52,7 @@ def test_for_a_program_and_as_a_page(offset_runs: list[str], tmp_path: Path,
     assert {"effect", "parameters", "error", "p_value", "confused_with"} <= best.keys()
     assert [one["p_value"] for one in others] == sorted(one["p_value"] for one in others)
     assert reported["judged_on"] == "held-out stretches"
-    refitted = reported["steps"][1]["error"]
+    refitted = reported["errors"][1]["error"]
     assert best["error"] < min([refitted, *(one["error"] for one in others)])
     assert reported["no_better_than_refitted"]
     assert reported["not_tried"].keys() == {"roll"}
@@ -105,7 +105,7 @@ def test_short_runs_are_judged_on_what_no_fit_saw_as_well(tmp_path: Path, capsys
     assert diagnose(*write_runs(tmp_path, named("sensor_offset", offset_m=0.4), lasts_s=8.0), "--json") == 0
     reported = json.loads(capsys.readouterr().out)
     assert reported["judged_on"] == "held-out stretches"
-    assert reported["steps"][-1]["error"] == pytest.approx(reported["noise_floor_error"], rel=0.1)
+    assert reported["errors"][-2]["error"] == pytest.approx(reported["noise_floor_error"], rel=0.1)
 
 
 @pytest.mark.slow

@@ -107,7 +107,7 @@ def test_for_a_program_where_nothing_is_missing(tmp_path: Path, capsys: pytest.C
     assert lab(write_runs(tmp_path / "runs", []), tmp_path / "out", "--json") == 0
     reported = json.loads(capsys.readouterr().out)
     assert reported["added"] == [] and reported["refused"] == [] and reported["unexplained"] is False
-    assert [step["error"] for step in reported["steps"]] == [reported["error_before"], reported["error_after"]]
+    assert [one["error"] for one in reported["errors"][:-1]] == [reported["error_before"], reported["error_after"]]
     assert reported["error_after"] == pytest.approx(reported["noise_floor_error"], rel=0.1)
     assert reported["vehicles"] == [] and Path(reported["story"]).read_text("utf-8").startswith("<!doctype html>")
 

@@ -252,7 +252,7 @@ def test_a_recorder_with_a_clock_of_its_own_hides_nothing(bench: Path, tmp_path:
     found = reported(capsys, "diagnose", "--vehicle", bench / "rig.yaml", tmp_path / "run")
     assert found["verdict"] == ["time_offset"]
     assert found["removed"]["distance"]["clock_ppm"] == pytest.approx(-80, abs=1)
-    assert found["steps"][-1]["error"] < 1.1 * found["noise_floor_error"]
+    assert found["errors"][-2]["error"] < 1.1 * found["noise_floor_error"]
 
 
 def test_signals_come_back_from_python(tmp_path: Path) -> None:

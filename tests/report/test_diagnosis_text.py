@@ -307,7 +307,7 @@ def test_the_object_says_what_is_left_and_what_was_not_seen(shape: Shape) -> Non
     assert reported["beyond_tolerance"] == {"sprung_mass_kg": -0.13}
     assert reported["not_tried"] == {"roll": "one track is known"} and reported["undetectable"] == {"wheel_lift": 0.1}
     assert reported["judged_on"] == JUDGED_ON
-    assert reported["steps"][-1] == {"step": "with dry_friction", "error": 0.153}
+    assert (reported["errors"][-2]["model"], reported["errors"][-2]["error"]) == ("with dry_friction", 0.153)
     assert reported["sentences"] == [*diagnosis_summary(found), *looks_like(found)]
     seen = reported["unexplained_shape"]
     assert seen["repeats_every_m"] == pytest.approx(2 * np.pi * 0.31, rel=0.02)

@@ -77,7 +77,7 @@ def main() -> int:
             alike = f" or {', '.join(first['confused_with'])}" if first and first["confused_with"] else ""
             print(f"{seed} {kind}: {word} -> {', '.join(said['verdict']) or 'nothing'}{alike}; maybe "
                   f"{', '.join(said['undecided']) or 'nothing'}; {said['residual_over_noise']:.2f} of the noise; error "
-                  f"{', '.join(format(one['error'], '.3f') for one in said['steps'])}, of the noise alone "
+                  f"{', '.join(format(one['error'], '.3f') for one in said['errors'][:-1])}, of the noise alone "
                   f"{said['noise_floor_error']:.3f}; {took['cpu_s']:.0f} s of the processor", flush=True)
     false = sum(count for (_, kind), count in counts.items() if kind == "false")
     for hides, words in ((True, "one effect"), (False, "nothing")):

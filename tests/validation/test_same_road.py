@@ -33,7 +33,7 @@ def test_a_missing_effect_is_found(tmp_path: Path) -> None:
     first = next(one for one in reported["candidates"] if one["effect"] == reported["verdict"][0])
     assert "sensor_mount_resonance" in [first["effect"], *first["confused_with"]]
     assert {"effect", "parameters", "error", "p_value", "confused_with"} <= first.keys()
-    assert reported["steps"][-1]["error"] < reported["steps"][1]["error"] < reported["baseline_error"]
+    assert reported["errors"][-2]["error"] < reported["errors"][1]["error"] < reported["baseline_error"]
     assert {"sensor_gain", "tire_enveloping"} <= reported["taken_by_road"].keys()
     assert {"damper_asymmetry", "speed_scale", "roll"} <= reported["not_tried"].keys()
     assert any("share one scale" in one or "only together" in one for one in reported["sentences"])

@@ -27,8 +27,9 @@ from logger.lab.likelihood.posterior import Posterior, State
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.record_band import with_pass_bands
 from logger.lab.selection.add_effect import AddedEffects, add
+from logger.printable import Notify, silent
 from logger.profiles.excitation import Excitation
-from logger.question import TOLERANCE, UNKNOWN, Notify, WrongOption, silent
+from logger.question import TOLERANCE, UNKNOWN, WrongOption
 from logger.runs import Run, are_on_rig
 from logger.shipped import vehicle_path
 from logger.simulation.virtual_drive import SEARCH_HZ, SimulatedRuns

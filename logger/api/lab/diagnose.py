@@ -22,11 +22,11 @@ from logger.chart_data import MOST_DOTS, Array, Bars, Curves, Line
 from logger.errors import BadInput
 from logger.extraction.along_track import MeasuredLine
 from logger.lab.diagnosis import LabDiagnosis
-from logger.lab.residuals.fitted_laws import RATE, TRAVEL, FittedCar, ForceCurve
+from logger.lab.residuals.fitted_laws import RATE, TRAVEL, BenchForces, ForceCurve
 from logger.lab.residuals.unexplained import Shape
 from logger.lab.selection.detectability import DETECTABLE_SIGMA, Undetectable
 from logger.lab.selection.evidence import FALSE_ALARM, IMITATION
-from logger.lab.selection.holdout import JUDGED_ON, most_of
+from logger.lab.selection.holdout import JUDGED_ON, ErrorStep, most_of
 from logger.lab.unknown_road import diagnosis
 from logger.lab.unknown_road.diagnosis import UnknownRoadDiagnosis
 from logger.lab.unknown_road.same_road import NotOneRoad, SameRoad, placed_by_road
@@ -506,7 +506,6 @@ def _common_json(found: LabDiagnosis | UnknownRoadDiagnosis) -> dict[str, Any]:
              "held_out_log_likelihood_gain": None if one.held_out_gain is None else one.held_out_gain / 2}
             for one in found.candidates],
         "verdict": list(found.verdict), "unexplained": found.unexplained, "residual_over_noise": 1 + found.excess,
-        "steps": lab_words.steps_json(found.steps),
         "no_better_than_refitted": list(found.no_better),
         **lab_words.errors_json(found.steps, found.noise_floor_error),
     }
@@ -530,7 +529,7 @@ def diagnosis_blocks(found: LabDiagnosis, most: int | None) -> Iterator[Block]:
     """What a person reads of a diagnosis; at a terminal ``most`` so many candidates, None: all."""
     yield _tiles(found)
     yield from diagnosis_summary(found)
-    yield from bench_sections(found.car, found.steps[0].error)
+    yield from bench_sections(None if found.car is None else found.car.on_bench, found.steps[0])
     yield lab_words.removed_section(found.removed, found.band)
     yield from shape_sections(found)
     yield lab_words.steps_section(found.steps, found.noise_floor_error)
@@ -593,20 +592,20 @@ def car_sections(found: LabDiagnosis) -> list[Section]:
         Detail("The model's parameters", [bars, Table(
             ("Parameter", "Shift", "Known to (standard deviation)", ""), rows, (0, 3)), Hint(
             "A parameter that moves far may stand in for an effect that ridelog does not know.")] if rows else []),
-        *([Detail("Springs and dampers", [*map(_force, found.car.curves), Hint(
+        *([Detail("Springs and dampers", [*(_force(one, found.steps[0].words) for one in found.car.curves), Hint(
             "Over the range that the model's suspensions reach in 99.9 % of these runs, without forces that have a "
             "memory.")])] if found.car.on_bench is None else [])]
 
 
-def bench_sections(car: FittedCar | None, error: float) -> list[Section]:
-    """What every bench draws of a part: its force over the velocity and over the travel, sample by sample; ``error`` is
-    that of its file."""
-    if car is None or (part := car.on_bench) is None:
+def bench_sections(part: BenchForces | None, filed: ErrorStep) -> list[Section]:
+    """What every bench draws of a part: its force over the velocity and over the travel, sample by sample; ``filed``:
+    the part before any fit."""
+    if part is None:
         return []
     few = -(-len(part.travel_m) // MOST_DOTS)
-    forces = {"measured": part.measured_n, "file unchanged": part.before_n, "refitted": part.after_n}
-    if not error < 1:  # a file of unknown numbers is farther off than no force at all
-        del forces["file unchanged"]
+    forces = {"measured": part.measured_n, filed.words: part.before_n, "refitted": part.after_n}
+    if not filed.error < 1:  # a file of unknown numbers is farther off than no force at all
+        del forces[filed.words]
     return [Section("Force by velocity and by travel", [
         Curves(f"Force by {name}", f"{name} [{unit}], positive in extension", "force [N]", tuple(
             # Fewer of the model, so that both are seen.
@@ -615,11 +614,11 @@ def bench_sections(car: FittedCar | None, error: float) -> list[Section]:
         for name, unit, at in (("velocity", "m/s", part.rate_mps), ("travel", "mm", 1000 * part.travel_m))])]
 
 
-def _force(one: ForceCurve) -> Curves:
+def _force(one: ForceCurve, filed: str) -> Curves:
     return Curves(
         f"{one.axle.capitalize()} suspension: force by {one.motion}",
         f"{one.motion} [{_MOTION_UNITS[one.motion]}], positive in extension", "force [N]",
-        (Line("refitted", one.at, one.after_n), Line("file unchanged", one.at, one.before_n)))
+        (Line("refitted", one.at, one.after_n), Line(filed, one.at, one.before_n)))
 
 
 def _where(shape: Shape) -> Detail:

@@ -21,11 +21,12 @@ from logger.lab.laws.draft import Draft
 from logger.lab.laws.learn import Law, Learning, Nearest
 from logger.lab.laws.learn import learn as learn_law
 from logger.lab.laws.picture import picture
-from logger.lab.residuals.fitted_laws import BenchForces, FittedCar, fitted_car, force_by_rate
+from logger.lab.residuals.fitted_laws import BenchForces, bench_forces, force_by_rate
 from logger.lab.selection.add_effect import AddedEffects, add
 from logger.lab.selection.holdout import JUDGED_ON, ErrorStep
 from logger.plugins import catalogue
-from logger.question import Notify, function, silent
+from logger.printable import Notify, silent
+from logger.question import function
 from logger.report.blocks import Block, Blocks, Bullets, Detail, Hint, Section, Table, page
 from logger.report.document import Html, tiles
 from logger.report.quantities import finite, measured, numbers_of, unit_of
@@ -37,11 +38,11 @@ from logger.vehicle.uncertain import sized
 @dataclass(frozen=True, eq=False)
 class LearnedModel:
     """What was learned on a bench, and the model with it, fitted on all of the runs; None where no law is learned;
-    ``car``: how that differs from the file."""
+    ``part``: of a part alone, its forces."""
 
     learning: Learning
     addition: AddedEffects | None
-    car: FittedCar | None = None
+    part: BenchForces | None = None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -130,7 +131,7 @@ def learned(bench: Bench, notify: Notify = silent) -> LearnedModel:
         posterior, state = found.context.posterior, found.law.state
         return LearnedModel(found, add(bench.posterior(), bench.model.effects, [*added, found.law.one],
                                        len(found.law.draft.effect.trials()), state),
-                            fitted_car(posterior, posterior.start(bench.model.effects), state))
+                            bench_forces(posterior, posterior.start(bench.model.effects), state))
 
 
 def with_law(given: Bench, addition: AddedEffects, law: Path) -> tuple[Bench, AddedEffects]:
@@ -202,9 +203,9 @@ def law_blocks(learned: LearnedModel) -> Iterator[Block]:
         yield " ".join(lab_words.error_words(found.diagnosis.steps, found.diagnosis.noise_floor_error))
         return
     yield from sentences(found.law, addition)
-    if learned.car is not None and (part := learned.car.on_bench) is not None:
-        yield from bench_sections(learned.car, addition.error_before)
-        yield _by_velocity(addition, part)
+    if learned.part is not None:
+        yield from bench_sections(learned.part, addition.steps[0])
+        yield _by_velocity(addition, learned.part)
     yield from law_sections(found.law, addition, picture_of(learned))
     yield Detail(lab_words.MODEL_BY_MODEL, [
         lab_words.falling(f"NRMSE on {JUDGED_ON}", _steps(found, addition), addition.noise_floor_error)])
@@ -301,7 +302,7 @@ def as_json(found: Learning, addition: AddedEffects | None, path: str | None) ->
             "verdict": list(found.verdict), "unexplained": diagnosis.unexplained,
             "refused": found.refused and {"law": found.refused.title, "why": found.refused.why},
             "nearest": _nearest_json(found.refused.known if found.refused else None),
-            "steps": lab_words.steps_json(diagnosis.steps),
+            **lab_words.errors_json(diagnosis.steps, diagnosis.noise_floor_error),
             **lab_words.removed_json(diagnosis.removed),
         }
     one = law_learned(law, addition)
@@ -311,7 +312,7 @@ def as_json(found: Learning, addition: AddedEffects | None, path: str | None) ->
         "standard_errors": finite(one.standard_errors), "error_before": addition.error_before,
         "error_refitted": addition.error_refitted, "error_after": addition.error_after,
         "error_after_unseen": addition.error_after, "error_before_unseen": addition.error_refitted,
-        **lab_words.errors_json(addition.steps, addition.noise_floor_error),
+        **lab_words.errors_json(_steps(found, addition), addition.noise_floor_error),
         "noise_floor_error": addition.noise_floor_error,
         "verdict": [other.effect.name for other in law.effects], "unexplained": found.unexplained,
         "log_likelihood_gain": law.gain / 2,
@@ -319,7 +320,6 @@ def as_json(found: Learning, addition: AddedEffects | None, path: str | None) ->
                    "gain": law.listed / 2, "gain_with_law": law.with_law / 2},
         "nearest": _nearest_json(law.nearest),
         "confused_with": [other.name for other in law.rivals],
-        "steps": lab_words.steps_json(_steps(found, addition)),
         **lab_words.removed_json(addition.removed),
         "sentences": sentences(law, addition),
     }

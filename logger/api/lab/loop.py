@@ -17,7 +17,7 @@ from logger.api.lab import diagnose as diagnosing
 from logger.api.lab import learn as learning
 from logger.api.lab.bench import Bench, bench_with, with_candidates
 from logger.api.lab.question import LabLoopQuestion
-from logger.api.lab.words import MODEL_BY_MODEL, ModelByModel, falling, steps_json, steps_section
+from logger.api.lab.words import MODEL_BY_MODEL, ModelByModel, errors_json, falling, steps_section
 from logger.api.shown import check_out
 from logger.chart_data import Array, Curves, Line
 from logger.errors import BadInput
@@ -29,7 +29,8 @@ from logger.lab.likelihood.whittle import HIGHEST_OF_RATE
 from logger.lab.residuals.breakdown import ModelResiduals, frequencies
 from logger.lab.selection.add_effect import AddedEffects, ShiftedNumber, moved_between
 from logger.lab.selection.holdout import JUDGED_ON, ErrorStep
-from logger.question import Notify, function, silent
+from logger.printable import Notify, silent
+from logger.question import function
 from logger.report import document as doc
 from logger.report.blocks import SHOWN_ROWS, Block, Blocks, Bullets, Hint, Section, Table, page, text
 from logger.report.quantities import wrapped
@@ -342,7 +343,7 @@ def as_json(story: Story) -> dict[str, Any]:
         "error_before": models[0][1], "error_after": models[-1][1], "noise_floor_error": story.floor,
         "added": story.added, "refused": list(story.refused), "left": story.not_added,
         "unexplained": story.diagnoses[-1].unexplained,
-        "steps": steps_json(models),
+        **errors_json(models, story.floor),
         "effects": [{"effect": one.effect.name, "parameters": dict(one.values)} for one in story.last.effects],
         "biased": [one.name for one in story.moved if one.biased],
         "vehicles": [one.file for one in story.rounds], "law": story.law_file or None,

@@ -253,11 +253,6 @@ def steps_section(steps: Sequence[ErrorStep], floor: float, *more: Block) -> Det
                                    Table(("Step", "Model", "NRMSE"), rows, (0, 1)), *more])
 
 
-def steps_json(steps: Sequence[ErrorStep]) -> list[dict[str, Any]]:
-    """The same for a program."""
-    return [{"step": one.words, "error": one.error} for one in steps]
-
-
 def falling(title: str, steps: Sequence[ErrorStep], floor: float) -> Bars:
     """The error of each step, beside the noise."""
     return Bars(title, "NRMSE", tuple((one.words, one.error) for one in steps), (floor, "noise floor"))

@@ -17,7 +17,7 @@ band that is compared or a number at an end of its range, where it is the straig
 already, and where a known effect explains more in its place.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -30,6 +30,7 @@ from logger.lab.likelihood.standard_errors import deviations_from_null, standard
 from logger.lab.selection.evidence import INDISTINGUISHABLE, min_gain
 from logger.lab.selection.screening import Baseline
 from logger.lab.selection.stepwise import UNTRIED, Fitted, Search, Selection, is_outside_data
+from logger.printable import Notify, silent
 from logger.vehicle.effect import Chosen, Effect, ForceEffect
 from logger.vehicle.uncertain import NumberErrors
 
@@ -130,8 +131,6 @@ def _beyond(posterior: Posterior, one: Chosen) -> str:
     return "one of its parameters ended at a bound" if is_outside_data(posterior, one) else ""
 
 
-Progress = Callable[[str], None]
-
 DECISIVE = 2 * INDISTINGUISHABLE
 """What a law has to gain over known effects that explain all: twice what distinguishes two of them."""
 
@@ -184,7 +183,7 @@ class Learning:
 
 
 def learn(posterior: Posterior, effects: Mapping[str, Effect], families: Mapping[str, Family],
-          known: Mapping[str, Effect], present: Sequence[Chosen] = (), progress: Progress = lambda words: None
+          known: Mapping[str, Effect], present: Sequence[Chosen] = (), progress: Notify = silent
           ) -> Learning:
     """Learn a law.
 
@@ -243,7 +242,7 @@ class FamilySearch:
     @property
     def _known_forces(self) -> list[Effect]:
         """Of a part the effects that are forces; of a car all of them."""
-        is_part = self.selection.before.is_part
+        is_part = self.selection.before.posterior.vehicle.is_part
         return [one for one in self.search.effects if isinstance(one, ForceEffect) or not is_part]
 
     def best(self) -> Law | None:
@@ -271,10 +270,10 @@ class FamilySearch:
 
     def _found_on(self, base: Baseline, any_family: bool) -> Selection | None:
         """A model with a law more; None where none says anything."""
-        context = LawContext(base.posterior, base.state)
+        context, of_part = LawContext(base.posterior, base.state), base.posterior.vehicle.is_part
         drafts = {draft.effect: draft for family in self.families.values() if any_family or family.stands_out
                   for draft in family.drafts(context) if draft.key not in self.refused
-                  and (family.stands_out or isinstance(draft.effect, ForceEffect) or not base.is_part)}
+                  and (family.stands_out or isinstance(draft.effect, ForceEffect) or not of_part)}
         self.drafts.update(drafts)
         search = replace(self.search, effects=[*drafts], present=len(base.effects), _promising=set(), _rivals={},
                          effort=replace(self.search.effort, effects=1))
@@ -318,7 +317,7 @@ class FamilySearch:
     def _leaves_something(self, model: Baseline) -> bool:
         """Whether a model leaves more than noise, and than calibration errors. Of a part these leave nothing: a gain of
         its force is a factor of all forces in it, whose sizes are fitted."""
-        return model.explanation > 0 if model.is_part else exceeds_noise(model)
+        return model.explanation > 0 if model.posterior.vehicle.is_part else exceeds_noise(model)
 
     def _law(self, found: Selection) -> Law | None:
         """The law of a model; None where a known effect explains more in its place."""

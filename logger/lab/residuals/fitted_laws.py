@@ -63,16 +63,9 @@ def fitted_car(posterior: Posterior, stood: State, found: State) -> FittedCar:
     moved = {name: (float(np.expm1(log)), float(deviation)) for name, log, deviation in zip(
         prior.names, found.logs, prior.deviations, strict=True)}
     before, after = (posterior.car(one.effects, one.logs) for one in (stood, found))
-    if not (after.bends_laws or after.structure.held):
-        return FittedCar(moved, ())
-    responses = posterior.runs.respond(after, posterior.distance_error_m(found.record))
-    if after.structure.held:
-        samples = [np.stack([response.travel_m[:, 0], response.rate_mps[:, 0], run.measured_mps2,
-                             *(run.main(one) for one in by)])[:, run.first:]
-                   for run, response, *by in zip(posterior.runs.runs, responses, stood.predictions, found.predictions,
-                                                 strict=True)]
-        return FittedCar(moved, (), BenchForces(*np.concatenate(samples, axis=1)))
-    curves = []
+    if after.structure.held or not after.bends_laws:
+        return FittedCar(moved, (), bench_forces(posterior, stood, found))
+    responses, curves = posterior.runs.respond(after, posterior.distance_error_m(found.record)), []
     for motion, name in ((RATE, "rate_mps"), (TRAVEL, "travel_m")):
         size = np.concatenate([np.abs(getattr(one, name)[run.first:]) for run, one in zip(
             posterior.runs.runs, responses, strict=True)])
@@ -84,6 +77,19 @@ def fitted_car(posterior: Posterior, stood: State, found: State) -> FittedCar:
                         for laws in (car.laws[_wheels(car)[axle]] for car in (before, after)))
             curves.append(ForceCurve(axle, motion, at, old, new))
     return FittedCar(moved, tuple(curves))
+
+
+def bench_forces(posterior: Posterior, stood: State, found: State) -> BenchForces | None:
+    """The forces of a part in a fitted state, in comparison with another state; None of what is no part alone."""
+    car = posterior.car(found.effects, found.logs)
+    if not car.structure.held:
+        return None
+    responses = posterior.runs.respond(car, posterior.distance_error_m(found.record))
+    samples = [np.stack([response.travel_m[:, 0], response.rate_mps[:, 0], run.measured_mps2,
+                         *(run.main(one) for one in by)])[:, run.first:]
+               for run, response, *by in zip(posterior.runs.runs, responses, stood.predictions, found.predictions,
+                                             strict=True)]
+    return BenchForces(*np.concatenate(samples, axis=1))
 
 
 def force_by_rate(vehicle: Vehicle, effects: Sequence[Chosen], errors: NumberErrors, rate_mps: Array

@@ -97,14 +97,10 @@ class Baseline:
         """Of its objective; with the numbers of its effects free where its motion is given, as derivatives by them are
         exact then and take milliseconds. (Differences of a motion that is simulated are not: with them a mount was
         found in a beam that has none.)"""
-        slopes = own_slopes(self.posterior, self.state, self.linear.whiteners) if self.is_part else None
-        return _Quadratic.of(self.linear, [np.empty((0, one.kept)) for one in self.linear.whiteners]
+        whiteners, of_part = self.linear.whiteners, self.posterior.vehicle.is_part
+        slopes = own_slopes(self.posterior, self.state, whiteners) if of_part else None
+        return _Quadratic.of(self.linear, [np.empty((0, one.kept)) for one in whiteners]
                              if slopes is None else self.linear.whitened(slopes))
-
-    @property
-    def is_part(self) -> bool:
-        """Whether it is of a part alone, whose motion its bench gives."""
-        return self.posterior.vehicle.is_part
 
     @property
     def posterior(self) -> Posterior:

@@ -32,7 +32,8 @@ from logger.lab.selection.candidate_fit import CandidateFit, fit_roughly
 from logger.lab.selection.evidence import IMITATION, INDISTINGUISHABLE
 from logger.lab.selection.holdout import most_of
 from logger.lab.selection.screening import Baseline, Screened, Trial, effects_without
-from logger.lab.selection.stepwise import MeasuredRoad, Progress, Search, SearchEffort, is_outside_data
+from logger.lab.selection.stepwise import MeasuredRoad, Search, SearchEffort, is_outside_data
+from logger.printable import Notify
 from logger.simulation.virtual_drive import SEARCH_HZ, SimulatedRuns
 from logger.vehicle.effect import Chosen, Effect, Misalignment, Sought, chosen
 from logger.vehicle.models import structure_of
@@ -118,7 +119,7 @@ class UnknownNumbers(MeasuredRoad):
             by_squares.of_all(self._anchor(by_squares, near, self.starts), near), posterior))
 
     def screened(self, base: Baseline, effects: Sequence[Effect], seen: Misalignment, near: Chosen | None,
-                 pool: ThreadPoolExecutor, progress: Progress) -> list[Screened]:
+                 pool: ThreadPoolExecutor, progress: Notify) -> list[Screened]:
         """Effects screened on the model, and by squares in cars that are drawn, one after the other: a car ends early
         where it cannot reach the best so far at its pace, and once an effect has shown the numbers of the car, the
         others are tried with these. In the place of an effect they begin with what the model with it has shown, and

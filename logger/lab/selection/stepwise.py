@@ -8,7 +8,7 @@ whatever gains most in its place is kept, or nothing. The next round begins with
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -35,10 +35,9 @@ from logger.lab.selection.screening import (
     without_distance_trend,
     without_effect,
 )
+from logger.printable import Notify, silent
 from logger.vehicle.effect import Chosen, Effect, Misalignment
 from logger.vehicle.named_parameters import free_parameters_of
-
-Progress = Callable[[str], None]
 
 
 @dataclass(frozen=True)
@@ -124,7 +123,7 @@ class Likelihood(Protocol[M, P, F]):
     """What a search asks of a likelihood: of drives over a measured road, or over one that is integrated out."""
 
     def screened(self, base: M, effects: Sequence[Effect], seen: Misalignment, near: Chosen | None,
-                 pool: ThreadPoolExecutor, progress: Progress) -> list[P]:
+                 pool: ThreadPoolExecutor, progress: Notify) -> list[P]:
         """Effects screened on a model, the largest gain first; ``near`` is the one in whose place they are tried, and
         no trial of its own, ``seen`` how the runs are misaligned."""
 
@@ -195,7 +194,7 @@ class MeasuredRoad:
     """The likelihood of drives over a road that was measured."""
 
     def screened(self, base: Baseline, effects: Sequence[Effect], seen: Misalignment, near: Chosen | None,
-                 pool: ThreadPoolExecutor, progress: Progress) -> list[Screened]:
+                 pool: ThreadPoolExecutor, progress: Notify) -> list[Screened]:
         """Effects screened by simulations at their trial values; those of one name are forms of one."""
         misaligned = [seen]
         if base.state.size.is_unusually_large:
@@ -339,7 +338,7 @@ class Search(Generic[M, P, F]):
     effects: Sequence[Effect]
     present: int
     misalignment: Misalignment
-    progress: Progress = lambda words: None
+    progress: Notify = silent
     workers: int = 2
     effort: SearchEffort = SearchEffort()
     likelihood: Likelihood[Any, Any, Any] = field(default_factory=MeasuredRoad)

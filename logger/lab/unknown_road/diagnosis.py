@@ -6,7 +6,7 @@ are screened by score tests, fitted by Fisher scoring, and are to predict each d
 them. What cannot be identified is computed from the information of these drives, with the road and without it.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import partial
@@ -21,7 +21,7 @@ from logger.lab.likelihood.standard_errors import with_standard_errors
 from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.selection.detectability import DETECTABLE_SIGMA
 from logger.lab.selection.evidence import FALSE_ALARM, probability_by_chance
-from logger.lab.selection.holdout import AS_FILED, REFITTED, ErrorStep, HoldOut
+from logger.lab.selection.holdout import REFITTED, ErrorStep, HoldOut, as_filed
 from logger.lab.selection.screening import shared_parameters
 from logger.lab.selection.stepwise import Likelihood, Search, SearchEffort, names_of
 from logger.lab.unknown_road.same_road import (
@@ -37,10 +37,9 @@ from logger.lab.unknown_road.same_road import (
     road_agreements,
     screen,
 )
+from logger.printable import Notify, silent
 from logger.vehicle.effect import Chosen, DriveEffect, Effect, ForceEffect, Misalignment, RoadEffect, chosen
 from logger.vehicle.named_parameters import free_parameters_of
-
-Progress = Callable[[str], None]
 
 ABSORBED_BY_ROAD = 0.02
 """The road absorbs an effect of whose information it leaves a smaller share: over a measured road the same drives would
@@ -109,12 +108,12 @@ class UnmeasuredRoad(Likelihood[RoadModel, TrialOnRoad, RoadModel]):
     first_steps    from each start, of which the best goes on
     """
 
-    progress: Progress
+    progress: Notify
     starts: int = 2
     first_steps: int = 2
 
     def screened(self, base: RoadModel, effects: Sequence[Effect], seen: Misalignment, near: Chosen | None,
-                 pool: ThreadPoolExecutor, progress: Progress) -> list[TrialOnRoad]:
+                 pool: ThreadPoolExecutor, progress: Notify) -> list[TrialOnRoad]:
         """Effects screened by score tests at their trial values, all at once."""
         known = {} if near is None else near.values
         trials = [chosen(one, values) for one in effects
@@ -181,7 +180,7 @@ class UnmeasuredRoad(Likelihood[RoadModel, TrialOnRoad, RoadModel]):
 
 
 def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
-                       progress: Progress = lambda words: None) -> UnknownRoadDiagnosis:
+                       progress: Notify = silent) -> UnknownRoadDiagnosis:
     """Find the effects that the model, with those that are ``present``, lacks.
 
     ValueError if the car is not linear with one that is present; NotOneRoad for drives that are certainly over two.
@@ -197,7 +196,7 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
                          f"other's record. {NOT_ONE_ROAD}; name only drives over one road")
     progress("refitting the model's parameters and the road")
     before = fit(problem.preconditioned(nominal), nominal)
-    as_filed = before.problem.error(replace(nominal, roads=before.state.roads))
+    unfitted = before.problem.error(replace(nominal, roads=before.state.roads))
     base = replace(before, problem=before.problem.moved_as(before.state))
     search: Search[RoadModel, TrialOnRoad, RoadModel] = Search(
         tried, len(present), Misalignment(1.0, 0.0), progress, likelihood=UnmeasuredRoad(progress),
@@ -210,7 +209,7 @@ def diagnose_same_road(problem: SameRoad, effects: Mapping[str, Effect], present
     usual = {one.effect.name: one for one in screen(now, [chosen(one, one.usual) for one in remaining])}
     road = {name: one.share_beyond_road for name, one in usual.items() if one.share_beyond_road < ABSORBED_BY_ROAD}
     by_name = {one.effect.name: one for one in _with_errors(now)}
-    way = [ErrorStep(AS_FILED, as_filed), ErrorStep(REFITTED, base.hold_out.error),
+    way = [ErrorStep(as_filed(problem.tolerance), unfitted), ErrorStep(REFITTED, base.hold_out.error),
            *(ErrorStep(f"with {name}", steps.get(name, now.hold_out).error) for name in names)]
     way[-1] = way[-1]._replace(error=now.hold_out.error)
     undecided = tuple(one.chosen for one in selection.last.fits if search.may_imitate(now, one))
@@ -263,7 +262,7 @@ def _obstacles(problem: SameRoad, effects: Mapping[str, Effect], present: Sequen
     return found
 
 
-def _placed_anew(now: RoadModel, progress: Progress) -> RoadModel:
+def _placed_anew(now: RoadModel, progress: Notify) -> RoadModel:
     """The fit with its drives laid on each other by what its car feels: by a car without its effects they lie wrong,
     and the next effect would imitate that. Laid anew they may no longer have enough of a road in common: then they stay
     where they are."""

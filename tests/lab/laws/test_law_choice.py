@@ -53,8 +53,8 @@ class World:
 
         @dataclass(frozen=True)
         class Model(Made):
-            posterior: Any = field(default_factory=SimpleNamespace)
-            is_part: bool = of == "component"
+            posterior: Any = field(default_factory=lambda: SimpleNamespace(
+                vehicle=SimpleNamespace(is_part=of == "component")))
 
             @property
             def score(self) -> float:

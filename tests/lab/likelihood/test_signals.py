@@ -14,7 +14,7 @@ from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.signals import JointBands, Readings, by_signal
 from logger.lab.likelihood.whittle import Bands
-from logger.runs import RecordFacts, Run, Signal, signal_errors
+from logger.runs import RecordFacts, Run, Signal
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.vehicle.compose import compose
 
@@ -120,8 +120,12 @@ def test_residuals_by_signal_and_their_errors(run: Run) -> None:
     found = {signal.name: signal for signal in by_signal(list(map(Readings.of, runs)), bands, joined)}
     assert {name: len(signal.bands) for name, signal in found.items()} == {"": 2, "wheel_mps2": 1, "travel_m": 2}
     assert found["travel_m"].size == pytest.approx(np.sqrt((16 + 9) / 2))
-    errors = signal_errors(runs, [0.9 * each for each in joined])
-    assert errors == pytest.approx({"wheel_mps2": 0.1, "travel_m": 0.1})
+    posterior = Posterior(SimulatedRuns(runs, FINE_HZ), CAR, Tolerance())
+    short = [np.repeat([1.0, 0.9, 0.8], run.count), np.repeat([1.0, 0.8], run.count)]
+    errors = signals_with_noise(posterior, posterior.residuals_of(
+        [share * each for share, each in zip(short, joined, strict=True)]))
+    assert {name: error for name, (error, _) in errors.items()} == pytest.approx(
+        {"": 0.0, "wheel_mps2": 0.1, "travel_m": 0.2})
 
 
 def test_where_the_car_was_is_the_same_for_all_signals(run: Run) -> None:

@@ -11,7 +11,8 @@ import pytest
 
 from logger.lab.selection.evidence import IMITATION, probability_by_chance
 from logger.lab.selection.holdout import HoldOut
-from logger.lab.selection.stepwise import Progress, Search, SearchEffort
+from logger.lab.selection.stepwise import Search, SearchEffort
+from logger.printable import Notify
 from logger.vehicle.effect import STATIC_RATIO, Chosen, Effect, Misalignment, chosen
 
 from ...support.lab.secret_runs import EFFECTS
@@ -74,7 +75,7 @@ class MadeUp:
         return self.stops(what, share)
 
     def screened(self, base: Made, effects: Sequence[Effect], seen: Misalignment, near: Chosen | None,
-                 pool: ThreadPoolExecutor, progress: Progress) -> list[Tried]:
+                 pool: ThreadPoolExecutor, progress: Notify) -> list[Tried]:
         tried = [Tried(replace(base, effects=(*base.effects, chosen(one, one.usual)),
                                stuck=base.stuck and one.name not in self.frees), WORTH[one.name]) for one in effects]
         return sorted(tried, key=lambda one: -one.gain)
