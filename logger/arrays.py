@@ -9,6 +9,8 @@ import numpy.typing as npt
 Array = npt.NDArray[np.float64]
 Complex = npt.NDArray[np.complex128]
 Bools = npt.NDArray[np.bool_]
+Indices = npt.NDArray[np.intp]
+Whole = npt.NDArray[np.int64]
 AT_ONCE = 4096
 """Rows that are worked on together where all would take too much memory: some MB a column of a thousand."""
 ROUNDING = 1e-9

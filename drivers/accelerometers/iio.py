@@ -21,17 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from drivers.accelerometers._iio_device import (
-    AUTO,
-    AXES,
-    POLLED_HZ,
-    IioDevice,
-    Integers,
-    ScanLayout,
-    ScanPort,
-    read_description,
-    understood,
-)
+from drivers.accelerometers import _iio_device
 from drivers.accelerometers.accelerometer import (
     SERIAL_NOISE_MPS2,
     SERIAL_WAIT_S,
@@ -69,7 +59,7 @@ class IioConfig:
     """``device``: name of the chip or of its folder, or ``auto``; ``rate_hz``: asked of it; ``scale_mps2``: the step
     that it is set to, None leaves it; ``noise_mps2``: of the chip on the 100 Hz grid, r.m.s."""
 
-    device: str = setting(AUTO, Text())
+    device: str = setting(_iio_device.AUTO, Text())
     rate_hz: int = setting(200, Whole(100, 1000))
     scale_mps2: float | None = setting(None, OrNone("auto", Decimal(*_STEP_MPS2)))
     noise_mps2: float = setting(SERIAL_NOISE_MPS2, Decimal(*_NOISE_MPS2))
@@ -85,9 +75,9 @@ class IioSource:
     def __init__(self, settings: IioConfig, machine: Machine) -> None:
         self._settings = settings
         self._machine = machine
-        self._device: IioDevice | None = None
+        self._device: _iio_device.IioDevice | None = None
         self._scans = SerialSource(self.name, self._open_node, machine.now_us, SERIAL_WAIT_S, machine.sleep)
-        self._deadlines = Deadlines(US_PER_S // POLLED_HZ, machine.now_us, machine.sleep)
+        self._deadlines = Deadlines(US_PER_S // _iio_device.POLLED_HZ, machine.now_us, machine.sleep)
         self._values: list[int] = []
         self._description: dict[str, Any] = {}
         self._checked_us = self._described_us = self._opened_us = 0
@@ -104,14 +94,14 @@ class IioSource:
         """How it is read, where that is not by its buffer."""
         if self._device is None or not self._device.why_polled:
             return ""
-        return (f"read value by value, {POLLED_HZ} times a second, as {self._device.why_polled}: readings come less "
-                "evenly, and some may come twice (see docs/installation.md)")
+        return (f"read value by value, {_iio_device.POLLED_HZ} times a second, as {self._device.why_polled}: readings "
+                "come less evenly, and some may come twice (see docs/installation.md)")
 
     def open(self) -> None:
         settings = self._settings
-        self._device = IioDevice(self._machine.root, settings.device, settings.rate_hz, settings.scale_mps2)
+        self._device = _iio_device.IioDevice(self._machine.root, settings.device, settings.rate_hz, settings.scale_mps2)
         self._description = self._device.describe()
-        self._scan_bytes = understood(self._description).scan_bytes
+        self._scan_bytes = _iio_device.understood(self._description).scan_bytes
         self._carry = b""
         self._checked_us = self._opened_us = self._machine.now_us()
         self._described_us = -DESCRIBE_US
@@ -119,7 +109,7 @@ class IioSource:
             self._scans.open()
             return
         try:
-            for axis in AXES:
+            for axis in _iio_device.AXES:
                 path = self._device.path / f"in_accel_{axis}_raw"
                 self._values.append(os.open(path, os.O_RDONLY | os.O_CLOEXEC))
         except OSError as error:
@@ -164,9 +154,9 @@ class IioSource:
         if device is not None:
             device.close()
 
-    def _open_node(self) -> ScanPort:
+    def _open_node(self) -> _iio_device.ScanPort:
         assert self._device is not None
-        return ScanPort(self._device.node, self._machine.wait_readable)
+        return _iio_device.ScanPort(self._device.node, self._machine.wait_readable)
 
     def _poll_values(self) -> list[Event]:
         t_us = self._machine.now_us()
@@ -196,7 +186,7 @@ class IioDecoder:
 
     def __init__(self, settings: IioConfig) -> None:
         self._settings = settings
-        self._layout: ScanLayout | None = None
+        self._layout: _iio_device.ScanLayout | None = None
         self._dated: DatedSamples | None = None
         self._blocks: list[AccelerationBlock] = []
         self._ended = self._begins = False
@@ -236,8 +226,8 @@ class IioDecoder:
         """Take an event. BadReply (and nothing taken) for one that cannot be."""
         kind, rest = data[:1], data[1:]
         if kind == DESCRIPTION:
-            description = read_description(data)
-            self._describe(understood(description))
+            description = _iio_device.read_description(data)
+            self._describe(_iio_device.understood(description))
             self._begins |= description.get("begins") is True
         elif self._layout is None:
             self._undescribed += 1
@@ -267,7 +257,7 @@ class IioDecoder:
             np.concatenate([block.t_us for block in blocks]), np.concatenate([block.accel_mps2 for block in blocks]),
             np.concatenate([block.clipped for block in blocks]), blocks[-1].rate_hz)
 
-    def _describe(self, layout: ScanLayout) -> None:
+    def _describe(self, layout: _iio_device.ScanLayout) -> None:
         """A device, the same as before or another one."""
         if layout == self._layout:
             return
@@ -279,7 +269,7 @@ class IioDecoder:
         self._layout = layout
         self._dated = None if layout.polled else DatedSamples(layout.rate_hz)
 
-    def _take_scans(self, t_us: int, data: bytes, layout: ScanLayout, dated: DatedSamples) -> None:
+    def _take_scans(self, t_us: int, data: bytes, layout: _iio_device.ScanLayout, dated: DatedSamples) -> None:
         if not data or len(data) % layout.scan_bytes:
             raise BadReply(f"an IIO event of {len(data)} bytes: expected scans of {layout.scan_bytes}")
         scans = np.frombuffer(data, dtype=np.uint8).reshape(-1, layout.scan_bytes)
@@ -294,16 +284,16 @@ class IioDecoder:
         dated.add(UndatedSamples(begins, arrivals_us, layout.accel_mps2(raw), layout.clipped(raw),
                           np.ones(len(scans), dtype=np.bool_)))
 
-    def _take_values(self, t_us: int, data: bytes, layout: ScanLayout) -> None:
+    def _take_values(self, t_us: int, data: bytes, layout: _iio_device.ScanLayout) -> None:
         try:
-            raw: Integers = np.array([[int(word) for word in data.split()]], dtype=np.int64)
+            raw: _iio_device.Integers = np.array([[int(word) for word in data.split()]], dtype=np.int64)
         except (ValueError, OverflowError):
             raw = np.empty((1, 0), dtype=np.int64)
         if raw.shape != (1, 3):
             raise BadReply("an IIO event: expected three whole numbers")
         self._values += 1
         self._blocks.append(AccelerationBlock(np.array([t_us], dtype=np.int64), layout.accel_mps2(raw),
-                                              layout.clipped(raw), float(POLLED_HZ)))
+                                              layout.clipped(raw), float(_iio_device.POLLED_HZ)))
 
 
 class _Iio(Accelerometer[IioConfig]):

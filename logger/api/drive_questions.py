@@ -9,47 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union
 
 from drivers.catalogue import names
-from logger.api.shared_fields import (
-    Anyway,
-    Localized,
-    ResampleHz,
-    ResampleM,
-    Runs,
-    Unit,
-    Vehicle,
-    VehicleName,
-    files_of,
-)
+from logger import question
+from logger.api import shared_fields
 from logger.errors import BadInput
-from logger.question import (
-    ADDED,
-    AUTO,
-    CAR_MASS,
-    DAILY_HOURS,
-    LENGTH,
-    MODAL_METHODS,
-    MODAL_METHODS_GONE,
-    MOST_ROAD_SAMPLES,
-    PICTURES,
-    RATE,
-    READING_NOISE,
-    ROAD_WAVINESS,
-    ROUGHNESS,
-    SPACING,
-    SPEED,
-    WHEELBASE,
-    WINDOW,
-    Argument,
-    InPython,
-    LongQuestion,
-    Option,
-    Out,
-    Question,
-    Range,
-    Verb,
-    check_word_or_number,
-    word_or_number,
-)
 from logger.question import IRI as IRI_RANGE
 from logger.units import COMMON_SPEED_MPS, WINDOW_M
 
@@ -64,7 +26,7 @@ _WEIGHTINGS = ", ".join(names("logger.dsp.weightings", "WEIGHTING"))
 
 
 @dataclass(frozen=True)
-class ComfortQuestion(Question):
+class ComfortQuestion(question.Question):
     """Rate how a recorded ride feels and what it does to health: ISO 2631-1 values of an acceleration record.
 
       ridelog comfort seat.csv
@@ -85,21 +47,21 @@ class ComfortQuestion(Question):
     ('a_little_uncomfortable', 0.32)
     """
 
-    record: Annotated[Union["AccelerationRecord", "Drive", Path, str], Argument(
+    record: Annotated[Union["AccelerationRecord", "Drive", Path, str], question.Argument(
         "CSV with t_s,accel_z_mps2[,accel_x_mps2,accel_y_mps2]", metavar="FILE", read=Path)]
-    weighting: Annotated[str, Option(
+    weighting: Annotated[str, question.Option(
         f"weighting of accel_z_mps2: one of {_WEIGHTINGS} (default: wk). With wk, accel_x_mps2 and accel_y_mps2 are "
         "weighted by wd and combined with it", metavar="NAME")] = "wk"
     _: KW_ONLY
-    daily_hours: Annotated[float | None, Option(
-        "hours a day of such riding, for the health values (default: the length of the record)", DAILY_HOURS,
+    daily_hours: Annotated[float | None, question.Option(
+        "hours a day of such riding, for the health values (default: the length of the record)", question.DAILY_HOURS,
         "H")] = None
-    unit: Unit = None
-    resample_hz: ResampleHz = None
+    unit: shared_fields.Unit = None
+    resample_hz: shared_fields.ResampleHz = None
 
 
 @dataclass(frozen=True)
-class EstimateQuestion(LongQuestion):
+class EstimateQuestion(question.LongQuestion):
     """Estimate the road from a drive's acceleration: IRI of windows with standard errors, and the road's profile.
 
     RUN is a folder with a drive.csv (t_s,accel_z_mps2,speed_mps,distance_m), or such a file. Where a profile.csv lies
@@ -126,29 +88,32 @@ class EstimateQuestion(LongQuestion):
     True
     """
 
-    run: Annotated[Union["Drive", Path, str], Argument("folder with drive.csv, or a drive.csv", metavar="RUN",
-                                                       read=Path)]
-    vehicle: Annotated[Vehicle, Option(
+    run: Annotated[Union["Drive", Path, str], question.Argument("folder with drive.csv, or a drive.csv", metavar="RUN",
+                                                                read=Path)]
+    vehicle: Annotated[shared_fields.Vehicle, question.Option(
         "a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name), which also says where the "
         "sensor sits; in Python a model as well", metavar="NAME|FILE", read=str)]
     _: KW_ONLY
-    noise_mps2: Annotated[float | Literal["auto"] | None, Option(
-        f"r.m.s. noise of one reading before rounding, {READING_NOISE.words}; auto: learned from the drive, with a "
-        "standard error (default: what the run's run.yaml says, or auto)", metavar="auto|MPS2",
-        read=word_or_number(AUTO, READING_NOISE), check=check_word_or_number(AUTO, READING_NOISE))] = None
-    step_mps2: Annotated[float | None, Option(
-        "quantisation step of the readings [m/s2], 0: none (default: what the run's run.yaml says)", ADDED,
+    noise_mps2: Annotated[float | Literal["auto"] | None, question.Option(
+        f"r.m.s. noise of one reading before rounding, {question.READING_NOISE.words}; auto: learned from the drive, "
+        "with a standard error (default: what the run's run.yaml says, or auto)", metavar="auto|MPS2",
+        read=question.word_or_number(question.AUTO, question.READING_NOISE),
+        check=question.check_word_or_number(question.AUTO, question.READING_NOISE))] = None
+    step_mps2: Annotated[float | None, question.Option(
+        "quantisation step of the readings [m/s2], 0: none (default: what the run's run.yaml says)", question.ADDED,
         "MPS2")] = None
-    window_m: Annotated[float, Option("length of a window [m] (default: 7.62, 25 ft)", WINDOW, "M")] = WINDOW_M
-    unit: Unit = None
-    resample_hz: ResampleHz = None
-    anyway: Anyway = False
+    window_m: Annotated[float, question.Option(
+        "length of a window [m] (default: 7.62, 25 ft)", question.WINDOW, "M")] = WINDOW_M
+    unit: shared_fields.Unit = None
+    resample_hz: shared_fields.ResampleHz = None
+    anyway: shared_fields.Anyway = False
 
     def files_read(self) -> Sequence[Path]:
         from logger.store.formats.drive_file import DRIVE, PROFILE
 
         given = super().files_read()
-        return [*given, *(run / name for run in given for name in (DRIVE, PROFILE)), *files_of(self.vehicle)]
+        beside = [run / name for run in given for name in (DRIVE, PROFILE)]
+        return [*given, *beside, *shared_fields.files_of(self.vehicle)]
 
     def check_written(self, files: Mapping[str, Sequence[Path]]) -> None:
         for profile in files.get("--profile-out", ()):
@@ -163,7 +128,7 @@ class EstimateQuestion(LongQuestion):
 
 
 @dataclass(frozen=True)
-class CalibrateQuestion(LongQuestion):
+class CalibrateQuestion(question.LongQuestion):
     """Compute how much a vehicle shakes on known roads: IRI and Gd(n0) per r.m.s. acceleration, comfort per IRI.
 
     The vehicle's model drives over random roads of IRI 1 to 10 m/km at 10 to 70 mph: one line per speed, with
@@ -181,14 +146,14 @@ class CalibrateQuestion(LongQuestion):
     [27.9, 18.2, 13.3, 10.9, 9.5, 7.9, 7.1]
     """
 
-    vehicle: VehicleName
+    vehicle: shared_fields.VehicleName
     _: KW_ONLY
-    window_m: Annotated[float, InPython("length of a window [m], 2 to 200 (default: 7.62, 25 ft)")] = WINDOW_M
+    window_m: Annotated[float, question.InPython("length of a window [m], 2 to 200 (default: 7.62, 25 ft)")] = WINDOW_M
 
     stays: ClassVar[bool] = True
 
     def files_read(self) -> Sequence[Path]:
-        return files_of(self.vehicle)
+        return shared_fields.files_of(self.vehicle)
 
 
 def _columns(text: str) -> list[str]:
@@ -196,14 +161,14 @@ def _columns(text: str) -> list[str]:
 
 
 def _check_method(method: str) -> None:
-    if method in MODAL_METHODS_GONE:
+    if method in question.MODAL_METHODS_GONE:
         beside = " with `input_column`" if "x" in method else ""
         raise ValueError("no longer offered, because it missed or invented modes: expected `method` "
-                         f"{MODAL_METHODS_GONE[method]}{beside}")
+                         f"{question.MODAL_METHODS_GONE[method]}{beside}")
 
 
 @dataclass(frozen=True)
-class ModesQuestion(Question):
+class ModesQuestion(question.Question):
     """Find natural frequencies, damping ratios and mode shapes of a vibration record, each with its standard deviation.
 
     FILE is CSV with t_s and one column per sensor, evenly sampled: a free decay (push, let go, record) or the response
@@ -233,25 +198,26 @@ class ModesQuestion(Question):
     ([1.5], [0.02])
     """
 
-    record: Annotated[Union["ChannelRecord", Path, str, None], Argument(
+    record: Annotated[Union["ChannelRecord", Path, str, None], question.Argument(
         "CSV with t_s and one column per sensor", metavar="FILE", read=Path)] = None
-    method: Annotated[str | None, Option(
-        f"{', '.join(MODAL_METHODS)}: era for a free decay, ssi for a random response, n4sid with a measured input "
-        "(default: chosen from the record); decrement is Eq 5.2 of Blum 2015, for one mode of a free decay; not with "
-        "a vehicle", metavar="NAME", choices=MODAL_METHODS, check=_check_method)] = None
+    method: Annotated[str | None, question.Option(
+        f"{', '.join(question.MODAL_METHODS)}: era for a free decay, ssi for a random response, n4sid with a measured "
+        "input (default: chosen from the record); decrement is Eq 5.2 of Blum 2015, for one mode of a free decay; not "
+        "with a vehicle", metavar="NAME", choices=question.MODAL_METHODS, check=_check_method)] = None
     _: KW_ONLY
-    columns: Annotated[Sequence[str] | None, Option(
+    columns: Annotated[Sequence[str] | None, question.Option(
         "columns of the sensors (default: all but t_s, the input, and a drive's speed, distance and position)",
         metavar="A,B,...", read=_columns)] = None
-    input_column: Annotated[str | None, Option("column of the measured input", metavar="COLUMN", flag="--input")] = None
-    from_s: Annotated[float | None, Option("start of the part to analyse, as t_s [s]", metavar="S")] = None
-    to_s: Annotated[float | None, Option("end of that part, as t_s [s]", metavar="S")] = None
-    vehicle: Annotated[Vehicle | None, Option(
+    input_column: Annotated[str | None, question.Option(
+        "column of the measured input", metavar="COLUMN", flag="--input")] = None
+    from_s: Annotated[float | None, question.Option("start of the part to analyse, as t_s [s]", metavar="S")] = None
+    to_s: Annotated[float | None, question.Option("end of that part, as t_s [s]", metavar="S")] = None
+    vehicle: Annotated[shared_fields.Vehicle | None, question.Option(
         "the modes of a vehicle's file; with a FILE, the vehicle that was driven", metavar="NAME|FILE",
         read=str)] = None
-    speed_mps: Annotated[float | None, Option(
+    speed_mps: Annotated[float | None, question.Option(
         f"without a FILE: speed at which nonlinear forces are linearised (default: {COMMON_SPEED_MPS:g}); with a "
-        "FILE that has no speed: speed of the drive", SPEED, "MPS")] = None
+        "FILE that has no speed: speed of the drive", question.SPEED, "MPS")] = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -268,13 +234,14 @@ class ModesQuestion(Question):
             raise self.complaint("--out: expected a FILE with it")
 
 
-COMFORT = Verb(ComfortQuestion, "logger.api.rides:comfort", (PICTURES,))
-CALIBRATE = Verb(CalibrateQuestion, "logger.api.calibration:calibrate", (
-    Out("write the figures of each speed as CSV", metavar="FILE", others=("*",), many=False, is_drawn=False),))
-ESTIMATE = Verb(EstimateQuestion, "logger.api.drives:estimate", (
-    Out("write the windows as CSV; FILE.html, .png, .svg or .pdf: pictures; may repeat", metavar="FILE", others=("*",)),
-    Out("write the estimated profile as CSV", "--profile-out", "FILE", ("*",), many=False, is_drawn=False)))
-MODES = Verb(ModesQuestion, "logger.api.modal:modes", (PICTURES,))
+COMFORT = question.Verb(ComfortQuestion, "logger.api.rides:comfort", (question.PICTURES,))
+CALIBRATE = question.Verb(CalibrateQuestion, "logger.api.calibration:calibrate", (
+    question.Out("write the figures of each speed as CSV", metavar="FILE", others=("*",), many=False, is_drawn=False),))
+ESTIMATE = question.Verb(EstimateQuestion, "logger.api.drives:estimate", (
+    question.Out("write the windows as CSV; FILE.html, .png, .svg or .pdf: pictures; may repeat", metavar="FILE",
+                 others=("*",)),
+    question.Out("write the estimated profile as CSV", "--profile-out", "FILE", ("*",), many=False, is_drawn=False)))
+MODES = question.Verb(ModesQuestion, "logger.api.modal:modes", (question.PICTURES,))
 
 
 _OBSTACLES = ("add an obstacle to the road [m]; may repeat. bump (Eq 4.41 of Blum 2015): start_m, height_m, width_m; "
@@ -283,7 +250,7 @@ _OBSTACLES = ("add an obstacle to the road [m]; may repeat. bump (Eq 4.41 of Blu
               'In Python: {"bump": {"start_m": 20, "height_m": 0.08, "width_m": 3.6}}')
 
 
-_FLAT = Range(1.0, 10_000.0, "m")
+_FLAT = question.Range(1.0, 10_000.0, "m")
 
 
 def _file_or(unit: str) -> Callable[[str], float | Path]:
@@ -300,7 +267,7 @@ def _file_or(unit: str) -> Callable[[str], float | Path]:
 
 
 @dataclass(frozen=True)
-class SimulateQuestion(Question):
+class SimulateQuestion(question.Question):
     """Simulate a drive: what a vehicle's accelerometer would record on a road.
 
       ridelog simulate --vehicle rav4-2009 --profile road.csv --speed 20 --out drive.csv
@@ -330,29 +297,29 @@ class SimulateQuestion(Question):
     90.0
     """
 
-    vehicle: VehicleName
-    profile: Annotated[Union["Wheelpaths", Path, str, float, None], Option(
+    vehicle: shared_fields.VehicleName
+    profile: Annotated[Union["Wheelpaths", Path, str, float, None], question.Option(
         f"CSV (distance_m,elevation_m[,elevation_right_m]) or ERD; of two tracks a full car uses both, other cars the "
         f"left one. A number: a flat road of this length, {_FLAT.words}", metavar="FILE|M", read=_file_or("m"))] = None
-    speed_mps: Annotated[float | tuple[Any, Any] | Path | None, Option(
-        f"constant, {SPEED.words}; or a CSV with t_s,speed_mps, interpolated linearly: the drive lasts as "
+    speed_mps: Annotated[float | tuple[Any, Any] | Path | None, question.Option(
+        f"constant, {question.SPEED.words}; or a CSV with t_s,speed_mps, interpolated linearly: the drive lasts as "
         "long as the file", metavar="MPS|FILE", read=_file_or("m/s"))] = None
     _: KW_ONLY
-    obstacles: Annotated[Mapping[str, Mapping[str, float]] | Sequence[str] | None, Option(
+    obstacles: Annotated[Mapping[str, Mapping[str, float]] | Sequence[str] | None, question.Option(
         _OBSTACLES, metavar="NAME:PARAM=VALUE,...", read=str, many=list, flag="--obstacle")] = None
-    rate_hz: Annotated[float, Option("samples a second", RATE, "HZ")] = 100.0
-    noise_mps2: Annotated[float, Option("r.m.s. of the sensor's noise [m/s2]", ADDED, "MPS2")] = 0.0
-    step_mps2: Annotated[float, Option("quantisation step of the sensor [m/s2]", ADDED, "MPS2")] = 0.0
-    seed: Annotated[int, Option("seed of the noise (default: 1)", Range(0, float("inf")), "N")] = 1
+    rate_hz: Annotated[float, question.Option("samples a second", question.RATE, "HZ")] = 100.0
+    noise_mps2: Annotated[float, question.Option("r.m.s. of the sensor's noise [m/s2]", question.ADDED, "MPS2")] = 0.0
+    step_mps2: Annotated[float, question.Option("quantisation step of the sensor [m/s2]", question.ADDED, "MPS2")] = 0.0
+    seed: Annotated[int, question.Option("seed of the noise (default: 1)", question.Range(0, float("inf")), "N")] = 1
     name: Annotated[str, "of the run; each of several needs its own"] = "simulated"
-    excitation: Annotated[Path | None, Option(
+    excitation: Annotated[Path | None, question.Option(
         "for a test rig, in place of --profile and --speed: the elevation under its wheels over time, as CSV "
         "(t_s,elevation_m[,elevation_rear_m])", metavar="FILE", read=Path)] = None
-    effects: Annotated[Sequence[str], Option(
+    effects: Annotated[Sequence[str], question.Option(
         "a physical effect, or the path of a Python file with one of your own; may repeat. Parameters that you do not "
         "give have their usual values. It replaces the vehicle's own effect of that "
         "name", metavar="NAME[:PARAM=VALUE,...]", read=str, many=list, flag="--effect")] = ()
-    outputs: Annotated[Sequence[str], Option(
+    outputs: Annotated[Sequence[str], question.Option(
         "further columns; may repeat. wheels: their acceleration; travel: extension of the suspensions; tires: height "
         "of the wheels over the road; body:ahead_m=X,left_m=Y: acceleration of another point of the body, from the "
         "centre of gravity", metavar="WHAT", read=str, many=list, flag="--output")] = ()
@@ -364,7 +331,7 @@ class SimulateQuestion(Question):
             raise self.wrong(beside[0], ": expected none with `excitation`, as a rig has no road")
         if self.excitation is None and (missing := [one for one in ("profile", "speed_mps") if given[one] is None]):
             raise self.complaint(f"simulate: expected {', '.join(f'`{one}`' for one in missing)}")
-        for name, within in (("profile", _FLAT), ("speed_mps", SPEED)):
+        for name, within in (("profile", _FLAT), ("speed_mps", question.SPEED)):
             value = getattr(self, name)
             if isinstance(value, int | float) and (words := within.fault(value)):
                 raise self.wrong(name, words)
@@ -374,20 +341,21 @@ class SimulateQuestion(Question):
 
     def files_read(self) -> Sequence[Path]:
         given = (self.profile, self.excitation, self.speed_mps)
-        return [*(one for one in given if isinstance(one, Path)), *files_of(self.vehicle)]
+        return [*(one for one in given if isinstance(one, Path)), *shared_fields.files_of(self.vehicle)]
 
 
-SIMULATE = Verb(SimulateQuestion, "logger.api.drives:simulation", (
-    Out("drive to write; a file called profile.csv: the road that was driven, with its obstacles. Both in one folder "
-        "form a run. FILE.html, .png, .svg or .pdf: pictures; may repeat", metavar="FILE", others=("*",),
-        required=True),))
+SIMULATE = question.Verb(SimulateQuestion, "logger.api.drives:simulation", (
+    question.Out("drive to write; a file called profile.csv: the road that was driven, with its obstacles. Both in one "
+                 "folder form a run. FILE.html, .png, .svg or .pdf: pictures; may repeat", metavar="FILE",
+                 others=("*",), required=True),))
 
 
-ProfileFile = Annotated[Union["Wheelpaths", Path, str], Argument("CSV or ERD file", metavar="PROFILE", read=Path)]
+ProfileFile = Annotated[Union["Wheelpaths", Path, str], question.Argument(
+    "CSV or ERD file", metavar="PROFILE", read=Path)]
 
 
 @dataclass(frozen=True)
-class ProfileQuestion(Question):
+class ProfileQuestion(question.Question):
     """One about a ``profile``, or its file."""
 
     profile: ProfileFile
@@ -411,11 +379,11 @@ class IriQuestion(ProfileQuestion):
     (4.44, [4.3, 4.69, 4.44, 4.32])
     """
 
-    window_m: Annotated[float, Option(
+    window_m: Annotated[float, question.Option(
         "length of a window [m], or with its unit, such as 0.1mi or 25ft (default: 100, as road agencies report)",
         metavar="M")] = 100.0
-    resample_m: ResampleM = None
-    localized_m_per_km: Localized = None
+    resample_m: shared_fields.ResampleM = None
+    localized_m_per_km: shared_fields.Localized = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -437,11 +405,11 @@ class ClassifyQuestion(ProfileQuestion):
     ('C', True)
     """
 
-    resample_m: ResampleM = None
+    resample_m: shared_fields.ResampleM = None
 
 
 @dataclass(frozen=True, kw_only=True)
-class RandomRoadQuestion(Question):
+class RandomRoadQuestion(question.Question):
     """Make a random road with the spectrum of ISO 8608: Gd(n) = Gd(n0) (n / n0)^-w (Eq 4.1, 4.2 of Blum 2015).
     The same options give the same road.
 
@@ -460,32 +428,35 @@ class RandomRoadQuestion(Question):
       elevation, standard deviation  0.005887  m
     """
 
-    iso_class: Annotated[str | None, Option(
+    iso_class: Annotated[str | None, question.Option(
         "class of ISO 8608: the road has the geometric mean of its limits of Gd(n0)", metavar="A-H", read=str.upper,
         choices="ABCDEFGH", flag="--class")] = None
-    gd_n0_cm3: Annotated[float | None, InPython(
-        "degree of roughness Gd(n0), n0 = 0.1 cycles per metre [cm3]", ROUGHNESS)] = None
-    iri_m_per_km: Annotated[float | None, Option("IRI; Gd(n0) follows from Eq 4.40", IRI_RANGE, "M_PER_KM")] = None
-    length_m: Annotated[float, Option("length of the road [m]", LENGTH, "M")] = 1000.0
-    spacing_m: Annotated[float, InPython("between samples [m]", SPACING)] = 0.05
-    seed: Annotated[int, Option("seed of the random road (default: 1)", Range(0, float("inf")), "N")] = 1
-    waviness: Annotated[float, InPython("w, the slope of the spectrum", ROAD_WAVINESS)] = 2.0
+    gd_n0_cm3: Annotated[float | None, question.InPython(
+        "degree of roughness Gd(n0), n0 = 0.1 cycles per metre [cm3]", question.ROUGHNESS)] = None
+    iri_m_per_km: Annotated[float | None, question.Option(
+        "IRI; Gd(n0) follows from Eq 4.40", IRI_RANGE, "M_PER_KM")] = None
+    length_m: Annotated[float, question.Option("length of the road [m]", question.LENGTH, "M")] = 1000.0
+    spacing_m: Annotated[float, question.InPython("between samples [m]", question.SPACING)] = 0.05
+    seed: Annotated[int, question.Option(
+        "seed of the random road (default: 1)", question.Range(0, float("inf")), "N")] = 1
+    waviness: Annotated[float, question.InPython("w, the slope of the spectrum", question.ROAD_WAVINESS)] = 2.0
 
     def __post_init__(self) -> None:
         super().__post_init__()
         if sum(one is not None for one in (self.iso_class, self.gd_n0_cm3, self.iri_m_per_km)) != 1:
             raise self.complaint("expected one of `iso_class` and `iri_m_per_km`")
         both = f"`length_m` {self.length_m:g} `spacing_m` {self.spacing_m:g}: expected"
-        if self.length_m / self.spacing_m > MOST_ROAD_SAMPLES:
-            raise self.complaint(f"{both} at most {MOST_ROAD_SAMPLES} samples")
+        if self.length_m / self.spacing_m > question.MOST_ROAD_SAMPLES:
+            raise self.complaint(f"{both} at most {question.MOST_ROAD_SAMPLES} samples")
         last_m = int(self.length_m / self.spacing_m + 1e-9) * self.spacing_m
-        if last_m < LENGTH.low:
-            raise self.complaint(f"{both} the last sample at {LENGTH.low:g} m or more, it lies at {last_m:g} m")
+        if last_m < question.LENGTH.low:
+            raise self.complaint(f"{both} the last sample at {question.LENGTH.low:g} m or more, it lies at {last_m:g} "
+                                 "m")
 
 
-EXACT_IRI = Verb(IriQuestion, "logger.api.roads:iri", (PICTURES,))
-CLASSIFY = Verb(ClassifyQuestion, "logger.api.roads:classify", (PICTURES,))
-GENERATE = Verb(RandomRoadQuestion, "logger.api.roads:random_road")
+EXACT_IRI = question.Verb(IriQuestion, "logger.api.roads:iri", (question.PICTURES,))
+CLASSIFY = question.Verb(ClassifyQuestion, "logger.api.roads:classify", (question.PICTURES,))
+GENERATE = question.Verb(RandomRoadQuestion, "logger.api.roads:random_road")
 
 
 # --- learn-car ---
@@ -497,13 +468,13 @@ def _ahead(text: str) -> float:
         ahead_m = float(value)
     except ValueError:
         ahead_m = float("nan")
-    if name.strip() != "ahead_m" or not abs(ahead_m) <= WHEELBASE.high:
-        raise ValueError(f"expected ahead_m=METRES, from -{WHEELBASE.high:g} to {WHEELBASE.high:g}")
+    if name.strip() != "ahead_m" or not abs(ahead_m) <= question.WHEELBASE.high:
+        raise ValueError(f"expected ahead_m=METRES, from -{question.WHEELBASE.high:g} to {question.WHEELBASE.high:g}")
     return ahead_m
 
 
 @dataclass(frozen=True)
-class LearnCarQuestion(LongQuestion):
+class LearnCarQuestion(question.LongQuestion):
     """Learn a car that nobody has measured, from ordinary drives over roads that nobody has measured.
 
     Each DRIVE is a folder of logs (the sidecars keep what is needed), a dump of the box (.dump, .dump.gz), a run's
@@ -523,20 +494,21 @@ class LearnCarQuestion(LongQuestion):
     In Python: raises BadInput for drives that cannot be read or are too short, CheckFailed for those that fit no car.
     """
 
-    drives: Annotated[Runs, Argument("folder of logs, dump, run's folder, drive.csv or recording of a phone",
-                                     metavar="DRIVE", read=Path, many=list)]
-    wheelbase_m: Annotated[float, Option("distance between the axles [m]", WHEELBASE, "M")]
+    drives: Annotated[shared_fields.Runs, question.Argument(
+        "folder of logs, dump, run's folder, drive.csv or recording of a phone", metavar="DRIVE", read=Path,
+        many=list)]
+    wheelbase_m: Annotated[float, question.Option("distance between the axles [m]", question.WHEELBASE, "M")]
     _: KW_ONLY
-    mass_kg: Annotated[float | None, Option(
-        "mass of the whole car as driven [kg] (default: a typical one, as the IRI does not need it)", CAR_MASS,
+    mass_kg: Annotated[float | None, question.Option(
+        "mass of the whole car as driven [kg] (default: a typical one, as the IRI does not need it)", question.CAR_MASS,
         "KG")] = None
-    sensor: Annotated[float | None, Option(
+    sensor: Annotated[float | None, question.Option(
         "ahead_m=M: how far the sensor sits ahead (+) of the car's middle, to 0.2 m (default: near its centre of "
         "gravity)", metavar="ahead_m=M", read=_ahead)] = None
-    compare: Annotated[Path | None, Option(
+    compare: Annotated[Path | None, question.Option(
         "an earlier vehicle file of this car: report what has changed", metavar="FILE.yaml", read=Path)] = None
 
 
-LEARN_CAR = Verb(LearnCarQuestion, "logger.api.learn_car:learn_car", (
-    Out("write the vehicle's file; FILE.html, .png, .svg or .pdf: measured and modelled spectra by speed, before and "
-        "after; may repeat", metavar="mycar.yaml", others=(".yaml", ".yml")),))
+LEARN_CAR = question.Verb(LearnCarQuestion, "logger.api.learn_car:learn_car", (
+    question.Out("write the vehicle's file; FILE.html, .png, .svg or .pdf: measured and modelled spectra by speed, "
+                 "before and after; may repeat", metavar="mycar.yaml", others=(".yaml", ".yml")),))

@@ -17,15 +17,7 @@ from logger.api.shown import CommandResult
 from logger.bounds import CONFLICT_SIGMA, UNUSUAL_SIGMA
 from logger.chart_data import Chart, Curves, Line
 from logger.errors import BadInput, CheckFailed, as_bad_input
-from logger.estimation.drive_spectra import (
-    BLOCK_S,
-    DRIVE_SPECTRA,
-    DriveSpectra,
-    drive_spectra,
-    joined,
-    middles_hz,
-    spectra_of_fields,
-)
+from logger.estimation import drive_spectra
 from logger.estimation.rms_calibration import SPEEDS_MPS
 from logger.identification.unknown_car import (
     COORDINATES,
@@ -158,9 +150,9 @@ def _check_gravity(source: Path, felt_mps2: Any) -> None:
 def _check_braking(name: str, drive: drive_file.Drive) -> None:
     """CheckFailed where the vertical axis of a drive without gravity feels the car brake: means of its readings over
     blocks follow the change of the speed."""
-    length = round(BLOCK_S * drive.rate_hz)
+    length = round(drive_spectra.BLOCK_S * drive.rate_hz)
     ends = np.arange(0, len(drive.speed_mps), length)
-    gained = np.diff(drive.speed_mps[ends]) / BLOCK_S
+    gained = np.diff(drive.speed_mps[ends]) / drive_spectra.BLOCK_S
     felt = drive.accel_z_mps2[:len(gained) * length].reshape(-1, length).mean(axis=1)
     known = np.isfinite(felt + gained)
     if known.sum() < 3 or not np.ptp(gained[known]):
@@ -195,14 +187,14 @@ def _read_run(path: Path) -> drive_file.Drive:
     return replace(drive, facts=drive_file.facts_beside(table))
 
 
-def spectra_of(drive: drive_file.Drive) -> DriveSpectra:
+def spectra_of(drive: drive_file.Drive) -> drive_spectra.DriveSpectra:
     """The blocks of a drive, with what is known of its sensor."""
     facts = drive.facts
     known = [one for one in (facts.noise_mps2, facts.step_mps2 and facts.step_mps2 / 12**0.5) if one]
     noise = 2 * sum(one**2 for one in known) / drive.rate_hz if known else np.nan
     usable = np.isfinite(drive.accel_z_mps2) if drive.usable is None else drive.usable == READING
-    return drive_spectra(drive.accel_z_mps2, drive.speed_mps, usable, drive.rate_hz, noise,
-                         (facts.pass_band_hz or (0.0, np.inf))[1])
+    return drive_spectra.drive_spectra(drive.accel_z_mps2, drive.speed_mps, usable, drive.rate_hz, noise,
+                                       (facts.pass_band_hz or (0.0, np.inf))[1])
 
 
 # --- the answer ---
@@ -213,7 +205,7 @@ class _Used:
     """A drive that has blocks."""
     name: str
     seconds: float
-    spectra: DriveSpectra
+    spectra: drive_spectra.DriveSpectra
     vehicle: str = ""  # that the settings named, where it is known
 
 
@@ -232,12 +224,12 @@ def _of_logs(source: drive_file.Drive | Path | str) -> list[_Used] | None:
         name = log_name(log)
         try:
             content = read_sidecar(log) or {}
-            if name is not None and (fields := content.get(DRIVE_SPECTRA)):
-                spectra = spectra_of_fields(fields)
+            if name is not None and (fields := content.get(drive_spectra.DRIVE_SPECTRA)):
+                spectra = drive_spectra.spectra_of_fields(fields)
                 _check_gravity(log, fields.get("felt_mps2"))
                 vehicle = content.get("vehicle")
                 found[log.parent, name.session] = _Used(
-                    log.name, len(spectra) * fields.get("every", 1) * BLOCK_S / 2, spectra,
+                    log.name, len(spectra) * fields.get("every", 1) * drive_spectra.BLOCK_S / 2, spectra,
                     str(vehicle.get("name", "")) if isinstance(vehicle, dict) else "")
         except (OSError, ValueError) as error:
             raise BadInput(f"{log}: its sidecar cannot be used: {error}: leave the log out") from None
@@ -286,7 +278,7 @@ def learn_car(question: LearnCarQuestion) -> LearnedVehicle:
     knowledge = CarKnowledge(question.wheelbase_m, ahead_m=question.sensor,
                              ahead_std_m=_USUAL_STD_M if question.sensor is None else _GIVEN_STD_M)
     question.progress("finding the car")
-    problem, car = UnknownCar(joined([one.spectra for one in used]), knowledge).learn()
+    problem, car = UnknownCar(drive_spectra.joined([one.spectra for one in used]), knowledge).learn()
     question.progress("checking it")
     motion = problem.motion(car)
     by_motion, alike = problem.by_motion(car, np.full(len(motion), np.median(motion)))
@@ -358,7 +350,7 @@ def _moved(x: Array, at: int, step: float) -> Array:
 
 
 def _checked_drives(used: Sequence[_Used], knowledge: CarKnowledge, start: Array, nonlinear: float, tell: Any
-                    ) -> list[tuple[DriveSpectra, LearnedCar]]:
+                    ) -> list[tuple[drive_spectra.DriveSpectra, LearnedCar]]:
     """Each drive, or each group of many, with the car of the others. CheckFailed where one is of another car than the
     rest. ``nonlinear``: logarithm of how many times likelier than a linear car one is that depends on how fast its
     suspensions move: it explains drives that differ."""
@@ -377,12 +369,12 @@ def _checked_drives(used: Sequence[_Used], knowledge: CarKnowledge, start: Array
     for number, group in enumerate(groups):
         others = [one for other in groups[:number] + groups[number + 1:] for one in other]
         tell(f"checking {group[0].name}")
-        spectra = joined([one.spectra for one in group])
+        spectra = drive_spectra.joined([one.spectra for one in group])
         own = UnknownCar(spectra, loose).fit_of([start, loose.mean])
-        rest = UnknownCar(joined([one.spectra for one in others]), loose).fit_from(start)
+        rest = UnknownCar(drive_spectra.joined([one.spectra for one in others]), loose).fit_from(start)
         found.append((own.log_evidence + rest.log_evidence, group, others, spectra, own, rest))
     evidence, group, others, _, own, rest = max(found, key=lambda one: one[0])
-    one_car = UnknownCar(joined([one.spectra for one in used]), loose).fit_from(start)
+    one_car = UnknownCar(drive_spectra.joined([one.spectra for one in used]), loose).fit_from(start)
     if evidence - one_car.log_evidence > max(_TWO_CARS, nonlinear):
         name = _most_apart(own, rest, _COMPARED)
         those = "this drive is" if len(group) == 1 else f"this and the {len(group) - 1} drives after it are"
@@ -432,7 +424,7 @@ def _check_car(problem: UnknownCar, car: LearnedCar) -> None:
 
 
 def _answer(question: LearnCarQuestion, used: Sequence[_Used], problem: UnknownCar, car: LearnedCar,
-            missing: Sequence[str], unseen: Sequence[tuple[DriveSpectra, LearnedCar]]) -> LearnedVehicle:
+            missing: Sequence[str], unseen: Sequence[tuple[drive_spectra.DriveSpectra, LearnedCar]]) -> LearnedVehicle:
     knowledge, own = problem.knowledge, len(NUMBERS)
     errors = _unseen_errors(knowledge, unseen)
     noise = float(np.nanmedian(problem.noise) * np.exp(car.x[-1]))
@@ -473,7 +465,8 @@ def _answer(question: LearnCarQuestion, used: Sequence[_Used], problem: UnknownC
                           tuple(_charts(problem, car)), comments)
 
 
-def _unseen_errors(knowledge: CarKnowledge, unseen: Sequence[tuple[DriveSpectra, LearnedCar]]) -> dict[str, Any]:
+def _unseen_errors(knowledge: CarKnowledge, unseen: Sequence[tuple[drive_spectra.DriveSpectra, LearnedCar]]
+                   ) -> dict[str, Any]:
     """How far drives are from any car of this wheelbase, and from the one that was learned from the others."""
     found = [[misfit(UnknownCar(spectra, knowledge), x) for x in (knowledge.mean, rest.x)] for spectra, rest in unseen]
     before, after = np.sqrt(np.mean(np.square(found), axis=0)).tolist() if found else (None, None)
@@ -620,7 +613,7 @@ def _coordinate_errors(model: CarModel) -> Array:
 
 def _charts(problem: UnknownCar, car: LearnedCar) -> Iterator[Chart]:
     """Measured and expected spectra of thirds of the speeds."""
-    f_hz, speeds = middles_hz(), problem.spectra.speed_mps
+    f_hz, speeds = drive_spectra.middles_hz(), problem.spectra.speed_mps
     edges = np.quantile(speeds, (0.0, 1 / 3, 2 / 3, 1.0))
     start = problem.knowledge.mean
     before, _ = problem.with_blocks(start, problem.start(start))

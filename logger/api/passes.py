@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 import numpy as np
-import numpy.typing as npt
 
 from logger.api.log_questions import PassesQuestion, day_us, length_of
 from logger.api.shown import CommandResult
+from logger.arrays import Indices
 from logger.bounds import FALSE_SHARE
 from logger.chart_data import Array, Chart, Curves, Line
 from logger.comfort.iso2631 import comfort_word
@@ -30,22 +30,8 @@ from logger.report.page import number_button, page
 from logger.report.placed import column, iri_errors, of_passes, placed, trace_of
 from logger.report.quantities import known
 from logger.report.summary import comfort_words, counts
+from logger.roads import repeated_drives
 from logger.roads.iso8608 import iri_class
-from logger.roads.repeated_drives import (
-    Changes,
-    Means,
-    Passes,
-    PlaceToVisit,
-    Scatter,
-    Trends,
-    changes,
-    means,
-    passes_of,
-    places_to_visit,
-    scatter_of,
-    trends,
-    way_and_cell,
-)
 from logger.roads.road_matching import RoadNetwork, directions, east_and_north, lay, on_sphere
 from logger.roads.sections import FAIR_TO_IN_PER_MI, WindowErrors
 from logger.store.log.log_reader import LoggedFile, find_logs_in, iso_utc, read_found, split_drives, utc
@@ -63,7 +49,7 @@ class RepeatedDrives(CommandResult):
     lat_deg, lon_deg, heading_deg     (k,) where, and in which direction, clockwise from north
     """
 
-    drives: npt.NDArray[np.intp]
+    drives: Indices
     iri_m_per_km: Array
     iri_std_m_per_km: Array
     a_w_mps2: Array
@@ -145,18 +131,18 @@ class CombinedDrives:
     placed: int
     length_m: float
     above_m_per_km: float
-    passes: Passes
-    scatter: Scatter
-    iri: Means
+    passes: repeated_drives.Passes
+    scatter: repeated_drives.Scatter
+    iri: repeated_drives.Means
     a_w_mps2: Array
     a_w_std_mps2: Array
     speed_mps: Array
     lat_deg: Array
     lon_deg: Array
     heading_deg: Array
-    change: Changes | None
-    trend: Trends
-    visits: tuple[PlaceToVisit, ...]
+    change: repeated_drives.Changes | None
+    trend: repeated_drives.Trends
+    visits: tuple[repeated_drives.PlaceToVisit, ...]
 
 
 def combined_drives(records: Sequence[WindowRecord], length_m: float, above_m_per_km: float,
@@ -176,28 +162,28 @@ def combined_drives(records: Sequence[WindowRecord], length_m: float, above_m_pe
                      for name in ("way", "along_m"))
     half_m = column(rows, lambda one: (one.distance_end_m or 0.0) - (one.distance_start_m or 0.0)) / 2
 
-    def cells(values: Array, errors: WindowErrors) -> Passes:
-        return passes_of(way.astype(np.intp), middle_m - half_m, middle_m + half_m, number, time_s, values, errors,
-                         length_m)
+    def cells(values: Array, errors: WindowErrors) -> repeated_drives.Passes:
+        return repeated_drives.passes_of(way.astype(np.intp), middle_m - half_m, middle_m + half_m, number, time_s,
+                                         values, errors, length_m)
 
     time_s = column(rows, lambda one: None if one.utc_us is None else one.utc_us / US_PER_S)
     iri = column(rows, lambda one: one.iri_m_per_km if counts(one) else None)
     errors = iri_errors(rows)
     passes = cells(iri, errors)
-    scatter = scatter_of(passes)
-    mean = means(passes, scatter)
+    scatter = repeated_drives.scatter_of(passes)
+    mean = repeated_drives.means(passes, scatter)
     felt = cells(column(rows, lambda one: one.a_w_mps2 if counts(one) else None),
                  WindowErrors.undivided(column(rows, lambda one: one.a_w_std_mps2 or 0.0)))
-    comfort = means(felt, scatter_of(felt))
+    comfort = repeated_drives.means(felt, repeated_drives.scatter_of(felt))
     a_w, a_w_std = (_at(mean.key, comfort.key, values) for values in (comfort.iri_m_per_km, comfort.iri_std_m_per_km))
     driven = cells(column(rows, lambda one: one.speed_mps), WindowErrors.undivided(np.zeros(len(rows))))
-    speed = means(driven, scatter_of(driven))
+    speed = repeated_drives.means(driven, repeated_drives.scatter_of(driven))
     place = _places(rows, drives, np.where(np.isfinite(iri) & np.isfinite(errors.std), 0.0, np.nan), cells, mean)
-    visits = places_to_visit(mean, a_w, a_w_std, length_m, above_m_per_km)
+    visits = repeated_drives.places_to_visit(mean, a_w, a_w_std, length_m, above_m_per_km)
     return CombinedDrives(len(drives), len(records), len(rows), length_m, above_m_per_km, passes, scatter, mean, a_w,
                           a_w_std, _at(mean.key, speed.key, speed.iri_m_per_km), *place,
-                          None if split_s is None else changes(passes, scatter, split_s, length_m),
-                          trends(passes, scatter), visits)
+                          None if split_s is None else repeated_drives.changes(passes, scatter, split_s, length_m),
+                          repeated_drives.trends(passes, scatter), visits)
 
 
 def _at(key: np.ndarray, among: np.ndarray, values: Array) -> Array:
@@ -211,7 +197,8 @@ def _at(key: np.ndarray, among: np.ndarray, values: Array) -> Array:
 
 
 def _places(rows: Sequence[WindowRecord], drives: Sequence[Sequence[WindowRecord]], usable: Array,
-            cells: Callable[[Array, WindowErrors], Passes], mean: Means) -> tuple[Array, Array, Array]:
+            cells: Callable[[Array, WindowErrors], repeated_drives.Passes], mean: repeated_drives.Means
+            ) -> tuple[Array, Array, Array]:
     """Latitudes, longitudes and headings of cells, as means of points of the sphere and of directions."""
     traces = [trace_of(drive) for drive in drives]
     points = [on_sphere(one.lat_deg, one.lon_deg) for one in traces]
@@ -236,7 +223,7 @@ def chains(found: CombinedDrives) -> list[np.ndarray]:
     """Numbers of cells that follow each other on one way."""
     if not len(found.iri.key):
         return []
-    way, cell = way_and_cell(found.iri.key)
+    way, cell = repeated_drives.way_and_cell(found.iri.key)
     breaks = np.flatnonzero((np.diff(way) != 0) | (np.diff(cell) != 1)) + 1
     return np.split(np.arange(len(way)), breaks)
 
@@ -304,7 +291,7 @@ def _number(number: int, marked: Sequence[int]) -> str:
     return Linked(str(number), number_button(marked[number - 1], number)) if number <= len(marked) else str(number)
 
 
-def _visit_cells(found: CombinedDrives, one: PlaceToVisit) -> tuple[str, ...]:
+def _visit_cells(found: CombinedDrives, one: repeated_drives.PlaceToVisit) -> tuple[str, ...]:
     """A place to visit as words, from its direction on."""
     values = visit_values(found, one)
     a_w = values["a_w_mps2"]
@@ -313,7 +300,7 @@ def _visit_cells(found: CombinedDrives, one: PlaceToVisit) -> tuple[str, ...]:
             "" if a_w is None else comfort_words(values["comfort"]), f"{one.confidence:.0%}", str(one.drives))
 
 
-def _change_blocks(found: CombinedDrives, change: Changes) -> Iterator[Block]:
+def _change_blocks(found: CombinedDrives, change: repeated_drives.Changes) -> Iterator[Block]:
     """What changed between two periods: how much of the road, and the largest changes."""
     if not len(change.key):
         before, after = change.drives
@@ -335,14 +322,14 @@ def _change_blocks(found: CombinedDrives, change: Changes) -> Iterator[Block]:
     yield Hint("Place: its number in the work list, which combines both periods.")
 
 
-def changed(change: Changes, one: int) -> str:
+def changed(change: repeated_drives.Changes, one: int) -> str:
     """``worse`` or ``better``; nothing where no change is sure."""
     if not change.false_share[one] <= FALSE_SHARE:
         return ""
     return "worse" if change.change_m_per_km[one] > 0 else "better"
 
 
-def largest_changes(change: Changes) -> list[int]:
+def largest_changes(change: repeated_drives.Changes) -> list[int]:
     """The largest of those that are sure, worse or better."""
     sure = np.flatnonzero(change.false_share <= FALSE_SHARE)
     order = sure[np.argsort(-np.abs(change.change_m_per_km[sure]), kind="stable")]
@@ -392,7 +379,7 @@ def cell_values(found: CombinedDrives, index: int) -> dict[str, Any]:
     return values
 
 
-def visit_values(found: CombinedDrives, one: PlaceToVisit) -> dict[str, Any]:
+def visit_values(found: CombinedDrives, one: repeated_drives.PlaceToVisit) -> dict[str, Any]:
     """A place to visit by the names of its columns: where its worst cell is, and the figures of that."""
     values = cell_values(found, one.worst)
     a_w = values["a_w_mps2"]
@@ -415,7 +402,7 @@ _VISIT = ("what", "length_m", "confidence", "comfort", "drives", "iri_m_per_km",
 
 def _cells(found: CombinedDrives) -> Iterator[Feature]:
     """The cells way by way: each a line half-way to its neighbours."""
-    ways, _ = way_and_cell(found.iri.key)
+    ways, _ = repeated_drives.way_and_cell(found.iri.key)
     for chain in chains(found):
         places = [(float(found.lon_deg[cell]), float(found.lat_deg[cell])) for cell in chain]
         ends = [half_way(one, other) for one, other in pairwise(places)]

@@ -14,6 +14,7 @@ import numpy.typing as npt
 
 from logger.api.log_questions import SectionsQuestion, length_of
 from logger.api.shown import CommandResult
+from logger.arrays import Indices
 from logger.chart_data import Array, Chart, Curves, Line
 from logger.comfort.iso2631 import comfort_word
 from logger.errors import BadInput, as_bad_input
@@ -51,7 +52,7 @@ class Sections(CommandResult):
     """
 
     length_m: float
-    drive: npt.NDArray[np.intp]
+    drive: Indices
     start_m: Array
     end_m: Array
     known_m: Array

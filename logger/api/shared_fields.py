@@ -6,17 +6,8 @@ from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Union
 
+from logger import question
 from logger.errors import BadInput
-from logger.question import (
-    LIMIT,
-    TOLERANCE,
-    UNKNOWN,
-    USUAL_TOLERANCE,
-    Argument,
-    Option,
-    check_word_or_number,
-    word_or_number,
-)
 from logger.units import INCH_PER_MILE_M_PER_KM
 
 if TYPE_CHECKING:
@@ -28,23 +19,23 @@ Vehicle = Union["CarModel", Path, str]
 Runs = Union["Drive", Path, str, Sequence[Union["Drive", Path, str]]]
 """One run or several: records (``ridelog.Run``), or their folders."""
 
-VehicleName = Annotated[Vehicle, Option(
+VehicleName = Annotated[Vehicle, question.Option(
     "a vehicle that comes with ridelog, or a YAML file (with a / or .yaml in its name); in Python a model as well",
     metavar="NAME|FILE", read=str)]
-Anyway = Annotated[bool, Option("go on even if a run seems to be of another road or car, or in other units")]
-TrackedRuns = Annotated[Runs, Argument(
+Anyway = Annotated[bool, question.Option("go on even if a run seems to be of another road or car, or in other units")]
+TrackedRuns = Annotated[Runs, question.Argument(
     "folder with drive.csv and profile.csv (of a rig: excitation.csv)", metavar="RUN", read=Path, many=list)]
-Tolerance = Annotated[float | str | None, Option(
+Tolerance = Annotated[float | str | None, question.Option(
     "share by which masses, springs and dampers may be off, where the vehicle's file does not say (default: "
-    f"{USUAL_TOLERANCE:g}; their standard deviation is 0.625 of that; lengths have 0.02). {UNKNOWN}: nothing is "
-    "known of these",
-    metavar=f"SHARE|{UNKNOWN}", read=word_or_number(UNKNOWN, TOLERANCE),
-    check=check_word_or_number(UNKNOWN, TOLERANCE))]
+    f"{question.USUAL_TOLERANCE:g}; their standard deviation is 0.625 of that; lengths have 0.02). {question.UNKNOWN}: "
+    "nothing is known of these",
+    metavar=f"SHARE|{question.UNKNOWN}", read=question.word_or_number(question.UNKNOWN, question.TOLERANCE),
+    check=question.check_word_or_number(question.UNKNOWN, question.TOLERANCE))]
 Candidates = Annotated[Collection[str] | None, "names of the effects to be tried; None: all"]
-LowPass = Annotated[float | None, Option(
+LowPass = Annotated[float | None, question.Option(
     "compare record and model up to this frequency only, such as 20 (default: the whole band; ridelog recognises a "
     "low-passed record)", metavar="HZ")]
-EffectFiles = Annotated[Sequence[Path | str], Option(
+EffectFiles = Annotated[Sequence[Path | str], question.Option(
     "a Python file with an effect of your own, to be tried as well; may repeat. Or the name of a built-in effect that "
     "is not tried on these runs by default, such as play",
     metavar="FILE.py", read=Path, many=list, flag="--effect-file")]
@@ -59,10 +50,10 @@ def limit_of(text: str) -> float:
         raise ValueError("expected a number, as 2.5 (m/km) or 160in/mi") from None
 
 
-Localized = Annotated[float | None, Option(
+Localized = Annotated[float | None, question.Option(
     "list areas of localized roughness (AASHTO R 54): where the IRI over a sliding base of 25 ft exceeds this, in "
-    "m/km, or at a terminal as 160in/mi", LIMIT, "IRI", read=limit_of)]
-Unit = Annotated[str | None, Option(
+    "m/km, or at a terminal as 160in/mi", question.LIMIT, "IRI", read=limit_of)]
+Unit = Annotated[str | None, question.Option(
     "unit of the accelerations (default: m/s2; a record that is plainly in g is then refused)",
     choices=("mps2", "g"))]
 
@@ -74,11 +65,11 @@ def _rate_hz(text: str) -> float:
         raise ValueError("expected a rate in Hz; put the file before --resample") from None
 
 
-ResampleHz = Annotated[float | None, Option(
+ResampleHz = Annotated[float | None, question.Option(
     "for a record with uneven times, bursts or repeated samples: drop the repeats and resample it evenly at HZ, "
     "through an anti-alias filter. Without HZ (in Python 0): at its own rate, 100 Hz at least. The result says so",
     metavar="HZ", read=_rate_hz, bare=0.0)]
-ResampleM = Annotated[float | None, Option(
+ResampleM = Annotated[float | None, question.Option(
     "for an unevenly spaced profile: interpolate it linearly, with a sample every M metres. This changes the result, "
     "and the result says so",
     metavar="M")]

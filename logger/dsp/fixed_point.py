@@ -19,7 +19,7 @@ of gravity, and a car at rest gives zeros.
 
 Source: A. V. Oppenheim and R. W. Schafer, Discrete-Time Signal Processing, 6.9.3 (pairing and ordering).
 
-Integers for a cascade of second-order sections, chosen so that nothing in it can overflow, whatever comes in.
+Whole for a cascade of second-order sections, chosen so that nothing in it can overflow, whatever comes in.
 
 Problem: with a word length given, too fine a scale overflows and too coarse a scale drowns the signal in rounding; and
 a gain in the frequency domain says nothing about the peaks of a signal that nobody has seen yet.
@@ -85,9 +85,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from logger.arrays import ROUNDING, Array
+from logger.arrays import ROUNDING, Array, Whole
 from logger.dsp.filters import BlockFilter, SectionRows
 from logger.units import STANDARD_GRAVITY_MPS2
 
@@ -316,7 +315,6 @@ def _energy_db(response: Array) -> float:
     return 10.0 * math.log10(max(float(np.sum(response**2)), 1e-300))
 
 
-Integers = npt.NDArray[np.int64]
 
 FULL_SCALE_MPS2 = 16 * STANDARD_GRAVITY_MPS2  # the widest range of any accelerometer here
 FULL_SCALE_SLOPE = 1.0  # [m/m]: a kerb as high as the tire's footprint is long
@@ -348,14 +346,14 @@ class FixedFilter:
         """Filter the next samples, (n,) -> (n,), in the units of the cascade's input and output."""
         return self.process_counts(self.counts(x)).astype(np.float64) * self._cascade.output_step
 
-    def counts(self, x: Array) -> Integers:
+    def counts(self, x: Array) -> Whole:
         """Inputs (n,) as integers, clipped to full scale."""
         if np.isnan(x).any():
             raise ValueError("expected numbers, found a NaN")
         largest = self._cascade.largest_input
         return np.clip(np.rint(x / self._cascade.input_step), -largest, largest).astype(np.int64)
 
-    def process_counts(self, x: Integers) -> Integers:
+    def process_counts(self, x: Whole) -> Whole:
         """The integers of the specification: inputs within full scale, (n,) -> (n,)."""
         y = x.tolist()
         for section in self._sections:

@@ -5,20 +5,17 @@ from dataclasses import dataclass
 from math import exp, log
 
 import numpy as np
-import numpy.typing as npt
 
-from logger.arrays import Array, Bools
-
-Places = npt.NDArray[np.int64]
+from logger.arrays import Array, Bools, Whole
 
 
-def stretches_of(mask: Bools) -> tuple[Places, Places]:
+def stretches_of(mask: Bools) -> tuple[Whole, Whole]:
     """First places and ends (k,), half open, of the stretches in which a mask (n,) holds."""
     edges = np.flatnonzero(np.diff(mask.astype(np.int8), prepend=0, append=0))
     return edges[::2], edges[1::2]
 
 
-def stretches_inside(mask: Bools) -> tuple[Places, Places]:
+def stretches_inside(mask: Bools) -> tuple[Whole, Whole]:
     """The same, without those that hold the first or the last place."""
     first, end = stretches_of(mask)
     inside = (first > 0) & (end < len(mask))
@@ -30,7 +27,7 @@ _SHARE = 0.3
 _LATE = 0.5  # of the usual time between bursts
 
 
-def burst_ends(t_s: Array) -> npt.NDArray[np.int64] | None:
+def burst_ends(t_s: Array) -> Whole | None:
     """Numbers of the last samples of the bursts of a record with times (n,), not decreasing [s]; None: it has none."""
     steps = np.diff(t_s)
     inside = steps < _WITHIN * (t_s[-1] - t_s[0]) / max(1, len(steps))
@@ -39,7 +36,7 @@ def burst_ends(t_s: Array) -> npt.NDArray[np.int64] | None:
     return np.flatnonzero(np.append(~inside, True))
 
 
-def spread(t_s: Array, ends: npt.NDArray[np.int64]) -> Array:
+def spread(t_s: Array, ends: Whole) -> Array:
     """Even times (n,) [s] of samples that came in bursts. ValueError where no even rate stands behind them.
 
     Problem: a recorder that empties a sensor's buffer every now and then gives several samples one time, or nearly one.
@@ -234,7 +231,7 @@ def chernoff(hits: int, tries: int, chance: float) -> float:
     return exp(-tries * divergence)
 
 
-def _period(places: npt.NDArray[np.int64]) -> float:
+def _period(places: Whole) -> float:
     """Usual distance of new samples: a mean that leaves out where a new one happened to equal the one before."""
     gaps = np.diff(places)
     return float(gaps[gaps <= np.quantile(gaps, _OUTER) + 1].mean())

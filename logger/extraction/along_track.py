@@ -5,9 +5,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
-from logger.arrays import Array
+from logger.arrays import Array, Indices, Whole
 from logger.dsp.repeated_samples import stretches_of
 from logger.estimation.receiver_delay import FREEDOM
 from logger.geodesy import east_and_north_m
@@ -100,7 +99,6 @@ def passes(driven_m: Array, along_m: Array, aside_m: Array) -> list[Pass]:
     return found
 
 
-Ints = npt.NDArray[np.intp]
 
 NEAREST_FIXES_S = 0.02
 """Fixes nearer to each other than that are one: no receiver sends 50 a second."""
@@ -325,7 +323,7 @@ class _System:
             logs -= float(np.log(weight).sum())
         return blocks, pulls, squares, count, logs
 
-    def _nearest(self, time_s: Array) -> Ints:
+    def _nearest(self, time_s: Array) -> Indices:
         after = np.clip(np.searchsorted(self._time_s, time_s), 1, len(self._time_s) - 1)
         earlier = time_s - self._time_s[after - 1] < self._time_s[after] - time_s
         return np.asarray(after - earlier, dtype=np.intp)
@@ -465,7 +463,7 @@ class RunGrid:
 
     time_s: Array
     taken_s: Array
-    row: npt.NDArray[np.int64]
+    row: Whole
 
     def laid(self, values: Array) -> Array:
         """Values of readings (n,) as samples (m,), on straight lines where there was no reading."""

@@ -17,22 +17,11 @@ from math import atan, radians
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from logger.arrays import Array, Bools
+from logger.arrays import Array, Bools, Whole
 from logger.bounds import FASTEST_HZ, LONGEST_HOLE_S, ROUNDING_STEPS
 from logger.comfort.iso2631 import LEAST_TAKEN_HZ
-from logger.dsp.repeated_samples import (
-    burst_ends,
-    find_holds,
-    find_repeats,
-    fresh_samples,
-    fresh_times,
-    range_ends,
-    resolution,
-    spread,
-    stretches_of,
-)
+from logger.dsp import repeated_samples
 from logger.dsp.whole_record import mean_rate_hz, on_even_grid
 from logger.estimation.drive_alignment import MOVED_DEG, angle_rad, has_moved, sitting
 from logger.geodesy import EARTH_RADIUS_M
@@ -58,7 +47,7 @@ def stretches(time_s: Array, present: Bools, fix_s: Array, speed_mps: Array, lon
         return []
     at_s = time_s[present]
     breaks = [*_gaps(fix_s, longest_gap_s), *_gaps(at_s, LONGEST_HOLE_S)]
-    for first, end in zip(*stretches_of(speed_mps < stationary_mps), strict=True):
+    for first, end in zip(*repeated_samples.stretches_of(speed_mps < stationary_mps), strict=True):
         if fix_s[end - 1] - fix_s[first] > longest_standing_s:
             breaks.append((fix_s[first] + KEPT_STANDING_S, fix_s[end - 1] - KEPT_STANDING_S))
     begin_s, end_s = max(fix_s[0], at_s[0]), min(fix_s[-1], at_s[-1])
@@ -106,8 +95,8 @@ def clipped_samples(samples: Array) -> Bools:
     """Which samples (n, axes) stand at an end of the range on some axis (n,), as ``dsp.repeated_samples`` sees it."""
     found = np.zeros(len(samples), dtype=np.bool_)
     for axis in samples.T:
-        half = 0.5 * resolution(axis)
-        for one in range_ends(axis):
+        half = 0.5 * repeated_samples.resolution(axis)
+        for one in repeated_samples.range_ends(axis):
             found |= np.sign(one.at) * axis >= abs(one.at) - half
     return found
 
@@ -123,7 +112,7 @@ def even_samples(time_s: Array, samples: Array, rate_hz: float) -> EvenSamples:
     pieces = _pieces(time_s)
     if not pieces:
         raise ValueError(f"expected {_FEWEST} samples or more without a pause of {LONGEST_HOLE_S:g} s, found none")
-    held = find_holds(time_s, samples)
+    held = repeated_samples.find_holds(time_s, samples)
     whole = [_taken(time_s[part], samples[part], held[part]) for part in pieces]
     clipped = clipped_samples(np.concatenate([one[1] for one in whole]))
     ends = np.cumsum([len(one[0]) for one in whole])[:-1]
@@ -149,7 +138,7 @@ def even_samples(time_s: Array, samples: Array, rate_hz: float) -> EvenSamples:
 
 def holes_of(time_s: Array, held: Bools) -> tuple[Array, Array]:
     """Begin and end (k,) [s] of the holes that samples at times (n,) leave which were not taken (``find_holds``)."""
-    first, end = stretches_of(held)
+    first, end = repeated_samples.stretches_of(held)
     return time_s[first - 1], time_s[np.minimum(end, len(time_s) - 1)]
 
 
@@ -161,14 +150,14 @@ def _pieces(time_s: Array) -> list[Any]:
 
 def _taken(time_s: Array, samples: Array, held: Bools) -> tuple[Array, Array]:
     """What was taken, and when: without repeats, at times that grow."""
-    if (ends := burst_ends(time_s)) is not None:
-        time_s = spread(time_s, ends)
+    if (ends := repeated_samples.burst_ends(time_s)) is not None:
+        time_s = repeated_samples.spread(time_s, ends)
     grows = np.append(True, np.diff(time_s) > 0)
     time_s, samples, held = time_s[grows], samples[grows], held[grows]
-    repeats = find_repeats(samples[~held])
+    repeats = repeated_samples.find_repeats(samples[~held])
     if repeats is None:
         return time_s[~held], samples[~held]
-    return fresh_times(repeats, time_s[~held]), samples[~held][repeats.fresh]
+    return repeated_samples.fresh_times(repeats, time_s[~held]), samples[~held][repeats.fresh]
 
 
 def _laid(time_s: Array, samples: Array, clipped: Bools, own_hz: float, rate_hz: float
@@ -332,7 +321,6 @@ def fix_times_s(placed_s: Array, time_of_day_s: Array) -> Array:
     return times_s
 
 
-Ints = npt.NDArray[np.int64]
 
 _LATE = 1.5  # of the usual pace
 _SLOWEST_S, _USUAL_S = 5.0, 1.0
@@ -343,10 +331,10 @@ _LEAST_M = 50.0
 _MOVING = 0.3  # of the fastest
 
 
-def new_rows(time_s: Array, columns: Array, speed_mps: Array, hides_m: float = np.inf) -> Ints:
+def new_rows(time_s: Array, columns: Array, speed_mps: Array, hides_m: float = np.inf) -> Whole:
     """Rows with a fix that counts, of columns (n, c) at growing times (n,) [s]: those that are new, and of those that
     repeat one before some, as long as the car went no farther since, at its speed (n,), than ``hides_m``."""
-    fresh = np.flatnonzero(fresh_samples(columns))
+    fresh = np.flatnonzero(repeated_samples.fresh_samples(columns))
     if not len(fresh):
         return fresh
     usual_s = float(np.median(np.diff(time_s[fresh]))) if len(fresh) > 1 else _SLOWEST_S
@@ -364,7 +352,8 @@ def new_rows(time_s: Array, columns: Array, speed_mps: Array, hides_m: float = n
 
 def hidden_m(lat_deg: Array, lon_deg: Array) -> float:
     """How far a car can go while its places (k,) [degrees] do not change: the step in which they are written [m]."""
-    step_deg = np.array([resolution(lat_deg), resolution(lon_deg) * np.cos(np.radians(lat_deg.mean()))])
+    lat_step_deg, lon_step_deg = map(repeated_samples.resolution, (lat_deg, lon_deg))
+    step_deg = np.array([lat_step_deg, lon_step_deg * np.cos(np.radians(lat_deg.mean()))])
     return float(EARTH_RADIUS_M * np.radians(step_deg.max()))
 
 

@@ -15,9 +15,8 @@ from dataclasses import dataclass, replace
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
-import numpy.typing as npt
 
-from logger.arrays import Array, Bools
+from logger.arrays import Array, Bools, Indices
 
 RANK = 1e-8
 """Share of the largest eigenvalue, of a unit diagonal, below which a direction counts as not known at all: information
@@ -55,7 +54,7 @@ def correlation_of(covariance: Array) -> Array:
     return np.asarray(covariance / np.outer(deviations, deviations))
 
 
-def integrated_out(information: Array, nuisance: npt.NDArray[np.intp]) -> Array:
+def integrated_out(information: Array, nuisance: Indices) -> Array:
     """Information on the other numbers when those of these indices are integrated out (Schur complement)."""
     own = np.setdiff1d(np.arange(len(information)), nuisance)
     projected = whitening(information[np.ix_(nuisance, nuisance)]) @ information[np.ix_(nuisance, own)]

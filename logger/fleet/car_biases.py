@@ -36,11 +36,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from logger.arrays import AT_ONCE, Array
-
-Codes = npt.NDArray[np.intp]
+from logger.arrays import AT_ONCE, Array, Bools, Indices
 
 _MOST_SESSIONS = 50_000
 """Whose sums are squared in whole; of more, what their roads add to that comes from a part of them, evenly chosen."""
@@ -58,15 +55,15 @@ class RoadPasses:
     iri, years       means of their IRI [m/km] and of their times [years]
     """
 
-    road: Codes
-    session: Codes
-    car_of_session: Codes
+    road: Indices
+    session: Indices
+    car_of_session: Indices
     count: Array
     iri: Array
     years: Array
 
     @property
-    def car(self) -> Codes:
+    def car(self) -> Indices:
         """Of each (n,)."""
         return self.car_of_session[self.session]
 
@@ -202,7 +199,7 @@ class Elimination:
         return (out - np.diag(of_chosen)) * (sessions / len(chosen)) + np.diag(of_all)
 
 
-def _sparse(road: Codes, car: Codes, values: Array, last: Array, roads: int, cars: int) -> Any:
+def _sparse(road: Indices, car: Indices, values: Array, last: Array, roads: int, cars: int) -> Any:
     """Sums by road and car, and a last column."""
     from scipy.sparse import csr_matrix
 
@@ -234,7 +231,7 @@ def _product(one: Any, other: Any) -> Array:
     return out
 
 
-def _groups(information: Array) -> Codes:
+def _groups(information: Array) -> Indices:
     """Cars that share roads, the largest group first."""
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import connected_components
@@ -262,8 +259,8 @@ class CarBiases:
 
     gain: Array
     log_std: Array
-    group: Codes
-    known: npt.NDArray[np.bool_]
+    group: Indices
+    known: Bools
     growth_per_year: float
     pass_std: float
     session_std: float
@@ -330,7 +327,7 @@ def _repeats(passes: RoadPasses, cars: int) -> int:
 
     roads = int(passes.road.max()) + 1
 
-    def rank(of: Codes, count: int) -> int:
+    def rank(of: Indices, count: int) -> int:
         size = roads + count
         edges = csr_matrix((np.ones(len(of)), (passes.road, roads + of)), shape=(size, size))
         return size - int(connected_components(edges, directed=False)[0])

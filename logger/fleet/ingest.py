@@ -17,7 +17,7 @@ import numpy as np
 import numpy.typing as npt
 
 from drivers.disk import open_regular
-from logger.arrays import Array
+from logger.arrays import Array, Bools, Indices, Whole
 from logger.errors import BadInput
 from logger.files import read_bounded, replace_bytes
 from logger.fleet.dataset import ROW_TYPES, Dataset
@@ -144,7 +144,7 @@ def columns_of(logs: Sequence[tuple[bytes, str]]) -> list[LogColumns]:
             for (data, digest), one, size, last in zip(logs, checked, sizes, end.tolist(), strict=True)]
 
 
-def _checks(data: bytes) -> npt.NDArray[np.int64] | None:
+def _checks(data: bytes) -> Whole | None:
     """The check values of all lines; None where a line does not fit its own, or the header is another."""
     header, _, body = data.partition(b"\n")
     if header != HEADER.encode() or not body.endswith(b"\n"):
@@ -156,7 +156,7 @@ def _checks(data: bytes) -> npt.NDArray[np.int64] | None:
     return np.array(checks, dtype=np.int64)
 
 
-def _quick(logs: Sequence[bytes], checks: npt.NDArray[np.int64]) -> dict[str, npt.NDArray[Any]] | None:
+def _quick(logs: Sequence[bytes], checks: Whole) -> dict[str, npt.NDArray[Any]] | None:
     """All rows of intact logs, read at once, as each reading costs; None where a row is not what Arrow reads."""
     import pyarrow
     from pyarrow import csv
@@ -217,7 +217,7 @@ def joined_columns(parts: list[Mapping[str, npt.NDArray[Any]]]) -> dict[str, npt
 
 
 Columns = dict[str, npt.NDArray[Any]]
-Keyed = Callable[[Array, Array, Array, npt.NDArray[np.intp]], npt.NDArray[np.int64]]
+Keyed = Callable[[Array, Array, Array, Indices], Whole]
 """Latitudes, longitudes, directions (n,) [degrees] and numbers of drives, to keys of roads (n,)."""
 
 ERRORS = ("iri_std_m_per_km", "iri_level_std_m_per_km", "iri_common_std_m_per_km", "iri_place_std_m_per_km")
@@ -260,7 +260,7 @@ def filed_rows(session: Mapping[str, npt.NDArray[Any]], keyed: Keyed, trim_m: fl
     return Filed(out, int((kept & ~dated).sum()), int((kept & dated & ~placed).sum()), trimmed)
 
 
-def headings(lat_deg: Array, lon_deg: Array, drive: npt.NDArray[np.intp]) -> Array:
+def headings(lat_deg: Array, lon_deg: Array, drive: Indices) -> Array:
     """Directions (n,) from the row before to the row after, clockwise from north [degrees]; NaN where no neighbour of
     the same drive has another place."""
     count = len(lat_deg)
@@ -275,7 +275,7 @@ def headings(lat_deg: Array, lon_deg: Array, drive: npt.NDArray[np.intp]) -> Arr
     return np.where(moved_m >= least_move_m, np.degrees(np.arctan2(east, north)) % 360.0, np.nan)
 
 
-def _inside(rows: Mapping[str, npt.NDArray[Any]], drive: npt.NDArray[np.intp], trim_m: float) -> npt.NDArray[np.bool_]:
+def _inside(rows: Mapping[str, npt.NDArray[Any]], drive: Indices, trim_m: float) -> Bools:
     """Which rows lie farther from the ends of their drive than is cut; rows without a distance count as none."""
     if not trim_m:
         return np.ones(len(drive), dtype=np.bool_)
@@ -286,7 +286,7 @@ def _inside(rows: Mapping[str, npt.NDArray[Any]], drive: npt.NDArray[np.intp], t
     return np.asarray((from_start_m >= trim_m) & (to_end_m >= trim_m))
 
 
-def _passes(rows: Columns, drive: npt.NDArray[np.intp]) -> Columns:
+def _passes(rows: Columns, drive: Indices) -> Columns:
     """Means over each pass, at the row in its middle; nothing at the others."""
     again_m = 5 * SEGMENT_M
     count = len(drive)
@@ -472,7 +472,7 @@ class _Past:
         self._commits: dict[tuple[int, int], set[int]] = defaultdict(set)
         for car, session, commit in zip(ledger["car"], ledger["session"], ledger["commit"], strict=True):
             self._commits[car, session].add(commit)
-        self._now: dict[tuple[int, int], list[npt.NDArray[np.int64]]] = defaultdict(list)
+        self._now: dict[tuple[int, int], list[Whole]] = defaultdict(list)
 
     def holds(self, session: Session, digests: Sequence[str]) -> bool:
         """Whether all these logs of a session are known; from now on they are."""
@@ -486,7 +486,7 @@ class _Past:
             np.stack([rows[name] for name in _MARKS], axis=1).astype(np.int64))
 
     def known(self, session: Session, rows: Mapping[str, npt.NDArray[Any]]
-              ) -> tuple[npt.NDArray[np.bool_], npt.NDArray[np.bool_]]:
+              ) -> tuple[Bools, Bools]:
         """Which rows are known, and which are by number and time, with another check value."""
         segment = rows["segment"]
         parts = [*self._now[session.car, session.number], *self._filed(session)]
@@ -498,7 +498,7 @@ class _Past:
         when = (segment << 32) | (rows["utc_us"] // _SAME_US)
         return same, ~same & (np.isin(when, near) | np.isin(when - 1, near) | np.isin(when + 1, near))
 
-    def _filed(self, session: Session) -> Iterator[npt.NDArray[np.int64]]:
+    def _filed(self, session: Session) -> Iterator[Whole]:
         from pyarrow import parquet
 
         for number in sorted(self._commits.get((session.car, session.number), ())):

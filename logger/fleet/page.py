@@ -18,9 +18,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from logger.arrays import Array
+from logger.arrays import Array, Indices, Whole
 from logger.bounds import FALSE_SHARE
 from logger.errors import BadInput
 from logger.exchange.layer import Feature, Geometry, Layer, attributes, cut, format_of, iri_title
@@ -197,7 +196,7 @@ def _line(lat_deg: float, lon_deg: float, heading_deg: float, length_m: float) -
     return cut(((lon_deg - east, lat_deg - north), (lon_deg + east, lat_deg + north)))
 
 
-Codes = npt.NDArray[np.int64]
+Codes = Whole
 
 DEEPEST = 15  # Where a segment of 66 ft is some 6 pixels long at middle latitudes
 _STEPS = 4096
@@ -208,7 +207,7 @@ class History:
     """Means of quarters of a year since 1970, rows by road: its place in the table of segments, quarter, IRI [m/km],
     passes."""
 
-    segment: npt.NDArray[np.intp]
+    segment: Indices
     quarter: Codes
     iri_m_per_km: Array
     passes: Codes
@@ -288,7 +287,7 @@ def _tile_of(x: Array, y: Array, level: int, parts: int = 1) -> tuple[Codes, Cod
     return column, row
 
 
-def _by_tile(column: Codes, row: Codes, level: int) -> Iterator[tuple[str, npt.NDArray[np.intp]]]:
+def _by_tile(column: Codes, row: Codes, level: int) -> Iterator[tuple[str, Indices]]:
     """Names of tiles, and the rows that lie in each."""
     order = np.lexsort((row, column))
     new = (np.diff(column[order]) != 0) | (np.diff(row[order]) != 0)

@@ -16,14 +16,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from logger.arrays import Array
+from logger.arrays import Array, Indices, Whole
 from logger.geodesy import EARTH_RADIUS_M
 from logger.roads.road_matching import SEARCH_M, on_sphere
 from logger.units import MILE_M
 
-Keys = npt.NDArray[np.int64]
+Keys = Whole
 
 SEGMENT_M = MILE_M / 80  # Side of a cell, and length of a segment: eight make the 0.1 mi of 23 CFR 490
 DIRECTIONS = 8
@@ -111,7 +110,7 @@ class RoadPieces:
     lat_deg, lon_deg   of its two ends (k, 2) [degrees]
     """
 
-    road: npt.NDArray[np.intp]
+    road: Indices
     start_m: Array
     length_m: Array
     lat_deg: Array
@@ -156,7 +155,7 @@ class RoadMap:
         self._heading_deg = pieces.heading_deg
         self._tree = cKDTree(on_sphere(pieces.lat_deg.mean(axis=1), pieces.lon_deg.mean(axis=1)))
 
-    def keys(self, lat_deg: Array, lon_deg: Array, heading_deg: Array, drive: npt.NDArray[np.intp]) -> Keys:
+    def keys(self, lat_deg: Array, lon_deg: Array, heading_deg: Array, drive: Indices) -> Keys:
         """Keys (n,) of places and directions [degrees], in the order driven; ``drive`` distinguishes drives."""
         out = cell_keys(lat_deg, lon_deg, heading_deg)
         if not len(out):
@@ -171,7 +170,7 @@ class RoadMap:
         return np.where(found, chosen, out)
 
     def _candidates(self, lat_deg: Array, lon_deg: Array, heading_deg: Array
-                    ) -> tuple[npt.NDArray[np.intp], Array, npt.NDArray[np.int64]]:
+                    ) -> tuple[Indices, Array, Whole]:
         """Pieces (n, k) near places, what speaks against them (infinity: too far), and 1 where driven forwards."""
         count = min(_CANDIDATES, len(self.pieces.road))
         _, piece = self._tree.query(on_sphere(lat_deg, lon_deg), k=list(range(1, count + 1)))
@@ -193,7 +192,7 @@ class RoadMap:
         return piece, np.where(off_m <= SEARCH_M, cost, np.inf), forward
 
 
-def _of_neighbours(way: npt.NDArray[np.int64], cost: Array, drive: npt.NDArray[np.intp]) -> Array:
+def _of_neighbours(way: Whole, cost: Array, drive: Indices) -> Array:
     """What neighbours along the drive say of each candidate's road (n, k): the mean of their costs for it."""
     # Rows each way that vote: 30 m, over which a receiver's error has not changed but a junction is passed.
     neighbours = 4

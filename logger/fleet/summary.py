@@ -21,7 +21,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import numpy.typing as npt
 
-from logger.arrays import Array, Bools
+from logger.arrays import Array, Bools, Indices, Whole
 from logger.bounds import FALSE_SHARE
 from logger.fleet.car_biases import CarBiases, RoadPasses, car_biases
 from logger.fleet.dataset import Engine
@@ -199,7 +199,7 @@ def _inverse_trigamma(value: float) -> float:
     return at
 
 
-Keys = npt.NDArray[np.int64]
+Keys = Whole
 
 POOR_M_PER_KM = FAIR_TO_IN_PER_MI * INCH_PER_MILE_M_PER_KM
 SECTION_M = MILE_M / 10
@@ -354,7 +354,7 @@ def change_found(roads: RoadTable) -> float:
     return needed * float(np.median(roads.trend_std_m_per_km_per_year[known]))
 
 
-def piece_of(key: Keys) -> npt.NDArray[np.intp]:
+def piece_of(key: Keys) -> Indices:
     """The pieces of a map that keys (n,) of it mean."""
     return ((key & ~ON_MAP) >> 1).astype(np.intp)
 

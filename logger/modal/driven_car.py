@@ -21,9 +21,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from logger.arrays import Array, Bools
+from logger.arrays import Array, Bools, Whole
 from logger.estimation.road_spectrum import PIVOT_CPM
 from logger.fitting.fisher_scoring import integrated_out
 from logger.fitting.levenberg_marquardt import minimise
@@ -58,7 +57,7 @@ class Periodograms:
     """
 
     power: Array
-    bins: npt.NDArray[np.int64]
+    bins: Whole
     step_hz: float
     shares: Array
     speeds_mps: Array

@@ -31,9 +31,8 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from logger.arrays import Array, Complex
+from logger.arrays import Array, Complex, Indices
 from logger.modal.mode import OrderPoles
 
 Estimate = Callable[["Moments"], OrderPoles]
@@ -47,7 +46,7 @@ class Moments:
     count: int
     channels: int
 
-    def take(self, lags: range, channels: slice) -> npt.NDArray[np.intp]:
+    def take(self, lags: range, channels: slice) -> Indices:
         """Places of these lags and channels."""
         places = np.array(lags)[:, None] * self.channels + np.arange(self.channels)[channels]
         return places.ravel().astype(np.intp)

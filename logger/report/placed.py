@@ -6,12 +6,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from logger.arrays import Indices
 from logger.chart_data import Array
 from logger.left_out import LeftOut, counting
 from logger.records import WindowRecord
 from logger.report.summary import counts
 from logger.roads.repeated_drives import means, passes_of, place_key, scatter_of
-from logger.roads.road_matching import Ints, RoadNetwork, Trace, lay
+from logger.roads.road_matching import RoadNetwork, Trace, lay
 from logger.roads.sections import WindowErrors
 from logger.store.log.log_reader import LoggedFile
 from logger.units import US_PER_S, WINDOW_M
@@ -93,7 +94,7 @@ class PlacesPassed:
     """
 
     place: Array
-    drives: Ints
+    drives: Indices
     iri_m_per_km: Array
     iri_std_m_per_km: Array
 

@@ -20,9 +20,8 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-import numpy.typing as npt
 
-from logger.arrays import Array
+from logger.arrays import Array, Whole
 from logger.profiles.track import Way
 from logger.units import STANDARD_GRAVITY_MPS2
 from logger.vehicle.laws import MOST_MEMORY, CornerLaws, Law, Law2, Stribeck
@@ -90,7 +89,7 @@ class Stepper:
     by_force: Array
     tabulated: tuple[Array, Array, Array]
     rubs: Array
-    rubs_at: npt.NDArray[np.int64]
+    rubs_at: Whole
 
     @staticmethod
     def of(structure: Structure, laws: Sequence[CornerLaws], step_s: float) -> Stepper:

@@ -26,9 +26,8 @@ from types import CodeType, FunctionType
 from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
-from logger.arrays import Array
+from logger.arrays import Array, Whole
 from logger.vehicle.laws import MOST_MEMORY, MotionLaw, Seen
 
 try:
@@ -256,7 +255,6 @@ if COMPILED:
     ask = _njit(ask, forceinline=True)
 
 
-Whole = npt.NDArray[np.int64]
 Asked = tuple[Whole, Array, Array, Array, Array, Array, Array, Array, Array]
 """L laws by all that moves: whole numbers (L, 6); their own numbers, one after the other; what they felt at the
 beginning of a step (L, FELT); their states (L, MOST_MEMORY), those of rest at first; room for what one feels (FELT,),

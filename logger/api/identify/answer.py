@@ -32,16 +32,9 @@ from logger.chart_data import Array, Bars, Chart, Curves, Line
 from logger.dsp.filters import DecimatingLowPass
 from logger.errors import EXIT_CHECK_FAILED, EXIT_DONE, BadInput, CheckFailed, as_bad_input
 from logger.fitting.fisher_scoring import correlation_of
+from logger.identification import noise_models
 from logger.identification.drive_model import DriveModel
 from logger.identification.identifiability import NotIdentifiable
-from logger.identification.noise_models import (
-    LAGS,
-    UNTESTED,
-    Test,
-    autocorrelation,
-    autocorrelations,
-    cross_correlation,
-)
 from logger.identification.prediction_error_fit import Fit, FitOptions, least_share
 from logger.identification.session import LEAST_SAMPLES, drives_of, error_before, fit_options, obstacle_starts
 from logger.identification.shared_road_covariance import CommonRoughness, may_have_common, with_common_roughness
@@ -462,18 +455,18 @@ _MENTIONED = 0.7
 _DOUBTFUL = 0.1
 
 
-def tests(model: DriveModel, fit: Fit) -> tuple[Test, Test]:
+def tests(model: DriveModel, fit: Fit) -> tuple[noise_models.Test, noise_models.Test]:
     """Whether the fit's residuals are white, and whether they are free of the road; untested where they are no more
     than the predictions' own inaccuracy."""
     if fit.error_after < least_share(model):
-        return UNTESTED, UNTESTED
+        return noise_models.UNTESTED, noise_models.UNTESTED
     inputs = [whitener(fit.low_pass.apply(one)) for whitener, one in
               zip(fit.noise.whiteners, model.inputs(np.array(list(fit.parameters.values()))), strict=True)]
-    return (autocorrelation(fit.white, fit.noise.parameters - 1),
-            cross_correlation(fit.white, inputs, fit.sensitivities))
+    return (noise_models.autocorrelation(fit.white, fit.noise.parameters - 1),
+            noise_models.cross_correlation(fit.white, inputs, fit.sensitivities))
 
 
-def measured_json(fit: Fit, white: Test, free_of_road: Test) -> dict[str, Any]:
+def measured_json(fit: Fit, white: noise_models.Test, free_of_road: noise_models.Test) -> dict[str, Any]:
     """All of it for a program; null where nothing is known."""
     return _fit_json(fit, fit.free) | {
         "interval_95": {one.name: list(interval(fit, one)) for one in fit.free},
@@ -495,7 +488,7 @@ def _fit_json(fit: Fit | RoadFit, free: Sequence[Free]) -> dict[str, Any]:
         "at_bound": fit.at_bound, "iterations": fit.iterations}
 
 
-def doubts(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
+def doubts(fit: Fit, white: noise_models.Test, free_of_road: noise_models.Test) -> Iterator[str]:
     """What stands between the estimates and their being believed, each in words; nothing when all is well."""
     if not fit.converged:
         yield "the fit did not converge."
@@ -520,7 +513,7 @@ def _far_from_file(fit: Fit) -> Iterator[str]:
                    "file is wrong there, or the model lacks something that biases it.")
 
 
-def _p_value(test: Test) -> float | None:
+def _p_value(test: noise_models.Test) -> float | None:
     return test.p_value if test.degrees else None
 
 
@@ -549,7 +542,7 @@ def _first_lines(fit: Fit | RoadFit, head: str, error: str) -> Iterator[str]:
         yield _ends(fit)
 
 
-def measured_lines(fit: Fit, white: Test, free_of_road: Test) -> Iterator[str]:
+def measured_lines(fit: Fit, white: noise_models.Test, free_of_road: noise_models.Test) -> Iterator[str]:
     """What a person reads below the numbers of a fit over roads that are known."""
     yield from _far_from_file(fit)
     yield f"The residual is modelled as {fit.noise.words}."
@@ -618,7 +611,7 @@ def _correlated(fit: Fit | RoadFit) -> Iterator[str]:
         yield f"Correlated estimates (correlation beyond {_MENTIONED:g}): {'; '.join(large)}."
 
 
-def _checks(white: Test, free_of_road: Test) -> Iterator[str]:
+def _checks(white: noise_models.Test, free_of_road: noise_models.Test) -> Iterator[str]:
     if white.degrees:
         yield (f"Are residuals white (Ljung-Box)? p = {white.p_value:.2g} over {white.degrees} degrees of freedom: "
                + ("yes, standard errors can be trusted." if white.passed else
@@ -692,7 +685,7 @@ def charts(fit: Fit | RoadFit) -> list[Chart]:
 
 def _left(white: list[Array]) -> Curves:
     """G. M. Ljung and G. E. P. Box 1978: of white residuals each is nearly normal, of variance 1 / n."""
-    found = autocorrelations(white, min(LAGS, min(map(len, white)) - 1))
+    found = noise_models.autocorrelations(white, min(noise_models.LAGS, min(map(len, white)) - 1))
     lags = np.arange(1.0, len(found) + 1)
     bound = np.full(len(lags), NORMAL_95 / np.sqrt(sum(map(len, white))))
     return Curves("Autocorrelation of the residuals", "lag [samples]", "correlation", (

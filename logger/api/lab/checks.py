@@ -21,6 +21,7 @@ from logger.dsp.whole_record import thinned
 from logger.errors import BadInput, as_bad_input
 from logger.identification.noise_models import DOUBT
 from logger.identification.time_scale import at_time_scale
+from logger.lab import road_match
 from logger.lab.another_car import LikeliestRig, another_car, error_with_best_effect, likeliest_rig
 from logger.lab.likelihood.lag import SLOWEST_MPS
 from logger.lab.likelihood.priors import Tolerance
@@ -28,15 +29,6 @@ from logger.lab.likelihood.whittle import BLOCK_S, HIGHEST_OF_RATE
 from logger.lab.residuals.breakdown import ModelResiduals
 from logger.lab.residuals.road_coherence import chance_of_following
 from logger.lab.residuals.statistics import rank_correlation
-from logger.lab.road_match import (
-    RoadMatch,
-    below_bounce_band_hz,
-    better_placement,
-    bounce_band_hz,
-    match_below_bounce,
-    pool,
-    road_match,
-)
 from logger.lab.selection.evidence import FALSE_ALARM
 from logger.lab.selection.holdout import AS_PRINTED
 from logger.left_out import LeftOut
@@ -174,20 +166,20 @@ class _Followed:
 
     @cached_property
     def band_hz(self) -> tuple[float, float]:
-        return bounce_band_hz(self.body_hz)
+        return road_match.bounce_band_hz(self.body_hz)
 
     @cached_property
-    def around(self) -> list[RoadMatch]:
-        return [road_match(run, prediction, self.band_hz) for run, prediction in self.pairs]
+    def around(self) -> list[road_match.RoadMatch]:
+        return [road_match.road_match(run, prediction, self.band_hz) for run, prediction in self.pairs]
 
     @cached_property
-    def below(self) -> list[RoadMatch]:
-        band_hz = below_bounce_band_hz(self.lowest_body_hz)
-        return [road_match(run, prediction, band_hz) for run, prediction in self.pairs]
+    def below(self) -> list[road_match.RoadMatch]:
+        band_hz = road_match.below_bounce_band_hz(self.lowest_body_hz)
+        return [road_match.road_match(run, prediction, band_hz) for run, prediction in self.pairs]
 
     @cached_property
-    def below_at_hand(self) -> list[RoadMatch]:
-        return [match_below_bounce(run, prediction, self.lowest_body_hz) for run, prediction in self.pairs]
+    def below_at_hand(self) -> list[road_match.RoadMatch]:
+        return [road_match.match_below_bounce(run, prediction, self.lowest_body_hz) for run, prediction in self.pairs]
 
 
 def _followed(runs: SimulatedRuns, predictions: Sequence[Array], car: Car, tolerance: Tolerance) -> _Followed:
@@ -291,7 +283,7 @@ def _other_units_of_signals(runs: SimulatedRuns, predictions: Sequence[Array]) -
 def _other_roads(runs: SimulatedRuns, followed: _Followed, car: Car) -> Iterator[str]:
     """Which runs do not follow their road, and where they would fit."""
     strangers = [k for k, one in enumerate(followed.around) if one.is_refuted]
-    if not strangers and followed.around and pool(followed.around).is_refuted:
+    if not strangers and followed.around and road_match.pool(followed.around).is_refuted:
         strangers = list(range(len(followed.around)))
     for k in strangers:
         found, run = followed.around[k], runs.runs[k]
@@ -307,7 +299,7 @@ def _follows(run: Run, car: Car, body_hz: Array) -> bool:
     """Whether what drives a rig predicts its record, whatever its numbers are: at three samples a period of the upper
     edge of the band around its bounce, one more than the two that any signal needs."""
     still = ModelResiduals([run], car, [np.zeros(run.count)], [])
-    return chance_of_following(still, 3.0 * bounce_band_hz(body_hz)[1]) < FALSE_ALARM
+    return chance_of_following(still, 3.0 * road_match.bounce_band_hz(body_hz)[1]) < FALSE_ALARM
 
 
 def _another_car(word: str, model: CarModel, runs: SimulatedRuns, predictions: Sequence[Array],
@@ -339,7 +331,7 @@ def _advice(run: Run, car: Car, band_hz: tuple[float, float]) -> str:
     def predict(farther_m: Array, backwards: bool) -> Array:
         return run.main(both[backwards].predict(car, [farther_m], rough=True)[0])
 
-    found = better_placement(run, predict, band_hz, (track.start_m, track.end_m))
+    found = road_match.better_placement(run, predict, band_hz, (track.start_m, track.end_m))
     if found is None:
         return "the record fits nowhere on the profile. Does one of them belong to another road?"
     if found.backwards:

@@ -32,9 +32,8 @@ from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
-import numpy.typing as npt
 
-from logger.arrays import Array, Bools, Complex
+from logger.arrays import Array, Bools, Complex, Indices
 from logger.dsp.filters import DecimatingLowPass
 from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM, PIVOT_CPM
 from logger.identification.noise_models import RoadNoise
@@ -51,8 +50,6 @@ from logger.identification.unknown_road.road_operator import (
 )
 from logger.roads.iso8608 import CM3_M3, REFERENCE_N0_CPM, STANDARD_WAVINESS, displacement_psd
 from logger.vehicle.named_parameters import Free
-
-Ints = npt.NDArray[np.intp]
 
 GD_N0, WAVINESS, NOISE, OFFSET, SCALE = "gd_n0_cm3", "waviness", "noise_mps2", "place_offset_m", "distance_scale"
 HUNDREDTH = 0.01
@@ -399,7 +396,7 @@ class Roads:
         """Which of the numbers (r,) are of this kind: ``GD_N0``, ``WAVINESS``, ``OFFSET``, ``SCALE``, ``NOISE``."""
         return np.array([name.rpartition(".")[2] == what for name in self.names])
 
-    def places(self, road: int) -> Ints:
+    def places(self, road: int) -> Indices:
         """Indices of the places of a road's drives but the first."""
         return self.parts[road][self.are(OFFSET)[self.parts[road]]]
 

@@ -10,9 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
-from logger.arrays import Array
+from logger.arrays import Array, Indices
 from logger.runs import LATE_WITHIN_S, SLOWEST_MPS, Run
 
 WINDOW_S = 2.56
@@ -34,8 +33,8 @@ class Lags:
     speed_mps         in the window; NaN on a rig
     """
 
-    run: npt.NDArray[np.intp]
-    middle: npt.NDArray[np.intp]
+    run: Indices
+    middle: Indices
     along_m: Array
     lag_s: Array
     error_s: Array
@@ -161,7 +160,7 @@ def _windows(number: int, run: Run, prediction: Array) -> list[tuple[float, ...]
     return found
 
 
-def _centred(values: Array, groups: npt.NDArray[np.intp]) -> Array:
+def _centred(values: Array, groups: Indices) -> Array:
     sums, counts = np.bincount(groups, values), np.bincount(groups)
     return np.asarray(values - (sums / np.maximum(counts, 1))[groups])
 

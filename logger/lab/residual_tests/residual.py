@@ -22,17 +22,10 @@ from logger.lab.residual_tests.tests import (
     ResidualTests,
     in_band,
 )
+from logger.lab.residuals import statistics
 from logger.lab.residuals.breakdown import ModelResiduals
 from logger.lab.residuals.force_state_map import Curve
 from logger.lab.residuals.road_coherence import coherence_with_road
-from logger.lab.residuals.statistics import (
-    band_pass,
-    block_means,
-    mean_of_blocks,
-    periodogram,
-    rank_correlation,
-    strongest_line,
-)
 from logger.printable import percent
 from logger.runs import are_on_rig, short_names
 
@@ -161,8 +154,8 @@ class SkewnessTest(ResidualTest):
         scale = rms(tested.residuals.residual)
         if not scale > 0:
             return self.result()
-        mean, error, p_value = mean_of_blocks([(one / scale) ** 3 for one in tested.residuals.residual],
-                                              tested.residuals)
+        mean, error, p_value = statistics.mean_of_blocks([(one / scale) ** 3 for one in tested.residuals.residual],
+                                                         tested.residuals)
         return self.result(mean, error, p_value, abs(mean) > 0.5)
 
     def sentence(self, found: ResidualTestResult) -> str:
@@ -186,8 +179,8 @@ class ToneTest(ResidualTest):
             f_hz = np.fft.rfftfreq(len(residual), 1 / residuals.rate_hz)
             low_hz, high_hz = run.pass_band_hz
             inside = (f_hz >= low_hz) & (f_hz <= high_hz - (0.0 if residuals.whole else HALF_WIDTH_HZ + width_hz))
-            line = strongest_line(periodogram(residual), inside,
-                                  reach=round(width_hz * len(residual) / residuals.rate_hz))
+            line = statistics.strongest_line(statistics.periodogram(residual), inside,
+                                             reach=round(width_hz * len(residual) / residuals.rate_hz))
             if line is not None:
                 tones.append((line[1] * len(residuals.runs), float(f_hz[line[0]]), names[run.name]))
         if not tones:
@@ -234,7 +227,7 @@ class GainTest(ResidualTest):
         size = sum(float(one @ one) for one in residuals.model) / sum(map(len, residuals.model))
         if not size > 0:
             return self.result()
-        excess, error, p_value = mean_of_blocks(
+        excess, error, p_value = statistics.mean_of_blocks(
             [residual * model / size for residual, model in zip(residuals.residual, residuals.model, strict=True)],
             residuals)
         return self.result(1 + excess, error, p_value, LEAST_SHARE < abs(excess) < 0.5)
@@ -277,10 +270,10 @@ def _two_gains(residuals: ModelResiduals, low_hz: float, high_hz: float) -> tupl
 
     if high_hz <= low_hz:
         return None
-    model, residual = ([band_pass(one, low_hz, high_hz, residuals.rate_hz) for one in signals]
+    model, residual = ([statistics.band_pass(one, low_hz, high_hz, residuals.rate_hz) for one in signals]
                        for signals in (residuals.model, residuals.residual))
-    own = block_means(residuals, [one**2 for one in model], blocks=2)
-    cross = block_means(residuals, [a * b for a, b in zip(residual, model, strict=True)], blocks=2)
+    own = statistics.block_means(residuals, [one**2 for one in model], blocks=2)
+    cross = statistics.block_means(residuals, [a * b for a, b in zip(residual, model, strict=True)], blocks=2)
     third = len(own) // 3
     if third < 4 or not own.any():
         return None
@@ -384,8 +377,8 @@ class ExcitationTest(ResidualTest):
     def run(self, tested: ResidualEvidence) -> ResidualTestResult:
         """The correlation, with the residual where the model moves least and most."""
         residuals, parts = tested.residuals, tested.where.amplitude
-        rho, p_value = rank_correlation(*(block_means(residuals, [one**2 for one in signals])
-                                          for signals in (residuals.residual, residuals.model)))
+        rho, p_value = statistics.rank_correlation(*(statistics.block_means(residuals, [one**2 for one in signals])
+                                                     for signals in (residuals.residual, residuals.model)))
         low, high = parts[0], parts[-1]
         grown = max(high.residual_mps2, 1e-300) / max(low.residual_mps2, 1e-300)
         large = len(parts) > 1 and (grown > LEAST_GROWTH if rho > 0 else grown < 1 / LEAST_GROWTH)
@@ -411,13 +404,13 @@ class SpeedTest(ResidualTest):
         from scipy.special import stdtr
 
         residuals = tested.residuals
-        speed = block_means(residuals, residuals.kept(lambda run: run.speed_mps))
+        speed = statistics.block_means(residuals, residuals.kept(lambda run: run.speed_mps))
         if (freedom := len(speed) - 5) < 6:
             return self.result()
         slow, fast = (float(np.quantile(speed, one)) for one in (0.05, 0.95))
         if fast < LEAST_GROWTH * max(slow, 0.1):
             return self.result()
-        residual, model = (np.log(np.maximum(block_means(residuals, [one**2 for one in signals]), 1e-300))
+        residual, model = (np.log(np.maximum(statistics.block_means(residuals, [one**2 for one in signals]), 1e-300))
                            for signals in (residuals.residual, residuals.model))
         level = (model - model.mean()) / (float(model.std()) or 1.0)
         columns = np.column_stack([np.ones(len(level)), (speed - slow) / (fast - slow), level, level**2, level**3])

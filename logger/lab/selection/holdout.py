@@ -16,9 +16,8 @@ from itertools import pairwise
 from typing import NamedTuple, Protocol
 
 import numpy as np
-import numpy.typing as npt
 
-from logger.arrays import Array
+from logger.arrays import Array, Indices
 from logger.lab.likelihood.map_fit import own_slopes
 from logger.lab.likelihood.noise_floor import signals_with_noise
 from logger.lab.likelihood.posterior import Posterior, State
@@ -78,7 +77,7 @@ def most_of(power: float) -> float:
     return 0.5 * power
 
 
-def folds(run: Run) -> npt.NDArray[np.intp]:
+def folds(run: Run) -> Indices:
     """Number of the set that each sample that counts is held out with (n,), of each signal after the other."""
     time_s = np.arange(run.count - run.first) / run.rate_hz
     stretch_s = min(_STRETCH_S, (run.count - run.first) / run.rate_hz / _FOLDS)

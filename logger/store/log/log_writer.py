@@ -42,17 +42,9 @@ from typing import Any
 
 from drivers.disk import FileSystem
 from logger.records import WindowRecord
+from logger.store.log import recovery
 from logger.store.log.atomic_file import disk_words
 from logger.store.log.log_name import finished_path
-from logger.store.log.recovery import (
-    fill_finished,
-    finish_part,
-    first_segments_later,
-    logs_of_session,
-    remove_part,
-    repair_part,
-    tally_of,
-)
 from logger.store.log.row_format import HEADER, format_row
 from logger.store.log.sidecar import ClockMap, Tally, store_sidecar
 from logger.units import US_PER_S
@@ -161,10 +153,10 @@ class SegmentLog:
             part = self._left[0]
             finished: Path | None = finished_path(part)
             if part.exists():
-                limit = first_segments_later(self._files, logs_of_session(part))[part]
-                finished = repair_part(self._files, part, limit, self._clock).finished
+                limit = recovery.first_segments_later(self._files, recovery.logs_of_session(part))[part]
+                finished = recovery.repair_part(self._files, part, limit, self._clock).finished
             if finished is not None and finished.exists():
-                self._without_utc.append((finished, tally_of(self._files, finished)))
+                self._without_utc.append((finished, recovery.tally_of(self._files, finished)))
             self._left.pop(0)
         self._fill_earlier()
 
@@ -180,7 +172,7 @@ class SegmentLog:
             self._finish()
         else:
             self._close_file()
-            remove_part(self._files, self.path)
+            recovery.remove_part(self._files, self.path)
 
     def _open_next(self) -> None:
         self._part += 1
@@ -199,13 +191,13 @@ class SegmentLog:
     def _finish(self) -> None:
         self.sync()
         self._close_file()
-        finished = finish_part(self._files, self.path, self._given | self._more(), self._tally, self._clock)
+        finished = recovery.finish_part(self._files, self.path, self._given | self._more(), self._tally, self._clock)
         if self._clock is None and self._tally.unset:
             self._without_utc.append((finished, self._tally))
 
     def _fill_earlier(self) -> None:
         while self._clock is not None and self._without_utc:
-            fill_finished(self._files, *self._without_utc[0], self._clock)
+            recovery.fill_finished(self._files, *self._without_utc[0], self._clock)
             self._without_utc.pop(0)
 
     def _let_go(self) -> None:

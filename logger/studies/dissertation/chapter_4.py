@@ -10,8 +10,8 @@ from collections.abc import Sequence
 from itertools import chain, pairwise
 
 import numpy as np
-import numpy.typing as npt
 
+from logger.arrays import Bools
 from logger.chart_data import Curves, Field, Line
 from logger.comfort.iso2631 import COMFORT_WORDS, a_w, comfort_word
 from logger.dsp.weightings.wk import WEIGHTING
@@ -666,7 +666,7 @@ def fig_4_30(effort: Workload) -> Result:
     return Result((table,), verdict, pictures, values)
 
 
-def _blow_s(accel: Array, time_s: Array, part: npt.NDArray[np.bool_]) -> float:
+def _blow_s(accel: Array, time_s: Array, part: Bools) -> float:
     """When the acceleration is largest within a part of the record [s]."""
     return float(time_s[part][np.abs(accel[part]).argmax()])
 
