@@ -10,12 +10,12 @@ were refitted to such a record are no car's any more).
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
 
-from logger.arrays import Array
+from logger.arrays import Array, Bools
 from logger.bounds import CONFLICT_SIGMA, UNUSUAL_SIGMA
 from logger.lab.diagnosis import obstacles_of
 from logger.lab.likelihood.map_fit import align, fit
@@ -33,6 +33,8 @@ from logger.vehicle.vehicle import Vehicle
 POOR_ERROR, _GOOD_ERROR = 0.8, 0.35
 """From the first error on a model explains next to nothing: a third of the power (1 - 0.8 squared), a judgement. Up to
 the second a car explains a record, or moves like it: nine tenths of the power (0.35 squared is 0.12)."""
+
+_LEAST_OFF = SENSOR_GAIN.parameters[0].high
 
 
 @dataclass(frozen=True)
@@ -85,30 +87,51 @@ def another_car(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen]
 class LikeliestRig:
     """How the readings of runs compare with the rig, of all that a tolerance allows, whose motion is likest to them.
 
-    gains     how many times what that rig does each run read (runs,)
-    errors    NRMSE of that rig, times these gains, on each run (runs,)
+    gains     how many times what that rig does each run reads (1 + s,), of its first signal and of all others
+    errors    NRMSE of that rig, times these gains, on each run (1 + s,)
     least     from this factor on, either way, a gain is no sensor's, and not what the vehicle's masses and springs may
               be off by where a force was measured; infinite where these are not known
+    as_read   errors of the rig that is likest to what the runs read as it stands; empty: nothing asks for it
     """
 
-    gains: Array
-    errors: Array
+    gains: Sequence[Array]
+    errors: Sequence[Array]
     least: float
+    as_read: Sequence[Array] = ()
 
     @property
     def explains(self) -> Array:
         """Whether it moves as each run did (runs,)."""
-        return np.asarray((self.errors < _GOOD_ERROR) & (self.gains > 0))
+        return self._goes_along(_GOOD_ERROR)
 
     @property
     def goes_along(self) -> Array:
         """Whether each run is as it moves, not turned, as far as it explains something of it (runs,)."""
-        return np.asarray((self.errors < POOR_ERROR) & (self.gains > 0))
+        return self._goes_along(POOR_ERROR)
+
+    def _goes_along(self, error: float) -> Array:
+        return np.array([errors[0] < error and gains[0] > 0
+                         for gains, errors in zip(self.gains, self.errors, strict=True)])
 
     @property
     def is_misread(self) -> Array:
         """Whether each run reads as no sensor does (runs,)."""
-        return np.abs(np.log(np.where(self.explains, self.gains, 1.0))) > np.log(self.least)
+        gains = np.array([one[0] for one in self.gains])
+        return np.abs(np.log(np.where(self.explains, gains, 1.0))) > np.log(self.least)
+
+    def misread_signals(self, runs: Sequence[Run]) -> list[Bools]:
+        """Whether each signal beside the first (s,), per run, reads as no sensor does, though it follows a rig that
+        explains that one: turned over, or by a factor; and no rig explains both as they were read. What all masses and
+        forces may be off by changes a force, and all that moves alike."""
+        found = []
+        for place, (run, gains, errors) in enumerate(zip(runs, self.gains, self.errors, strict=True)):
+            force = np.array([one.measures == "force" for one in run.signals], bool)
+            gain = gains[1:] / np.where(force, 1.0, gains[0])
+            least = np.where(force, self.least, _LEAST_OFF)
+            off = (gain < 0) | (np.abs(np.log(np.maximum(np.abs(gain), 1e-300))) > np.log(least))
+            off &= bool(self.explains[place]) & (errors[1:] < _GOOD_ERROR)
+            found.append(off & ~(self.as_read[place][1:] < _GOOD_ERROR) if self.as_read else off)
+        return found
 
 
 def likeliest_rig(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chosen], predictions: Sequence[Array],
@@ -118,24 +141,48 @@ def likeliest_rig(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chose
 
     predictions    of the model (n,) per run
     """
-    if all(normalised_rms_error([run], [one]) < POOR_ERROR for run, one in zip(runs, predictions, strict=True)):
+    if all(_as_read(run, one).max() < POOR_ERROR for run, one in zip(runs, predictions, strict=True)):
         return None
     wide = Posterior(SimulatedRuns(list(map(_first_part, runs)), SEARCH_HZ), vehicle, tolerance)
+    some = wide.runs.runs
 
-    def gains_and_errors(predictions: Sequence[Array]) -> tuple[Array, Array]:
-        found = []
-        for run, one in zip(wide.runs.runs, predictions, strict=True):
-            read, model = run.kept_mps2 - run.kept_mps2.mean(), run.main(one)[run.first:]
-            model = model - model.mean()
-            gain = float(read @ model / max(model @ model, 1e-300))
-            found.append((gain, float(np.linalg.norm(read - gain * model)) / max(float(np.linalg.norm(read)), 1e-300)))
-        gains, errors = np.array(found).T
-        return gains, errors
+    def found_by(errors: Callable[[Run, Array], Array]) -> list[Array]:
+        logs = _cross_entropy_search(wide, effects, lambda found: float(np.linalg.norm(np.concatenate(
+            [errors(run, one) for run, one in zip(some, found, strict=True)]))))
+        return wide.runs.predict(wide.car(effects, logs))
 
-    logs = _cross_entropy_search(wide, effects, lambda found: float(np.linalg.norm(gains_and_errors(found)[1])))
     scale_std = wide.prior.scale_deviation if wide.shows_forces else 0.0
-    least = max(SENSOR_GAIN.parameters[0].high, np.exp(CONFLICT_SIGMA * scale_std)) if scale_std < 1 else np.inf
-    return LikeliestRig(*gains_and_errors(wide.runs.predict(wide.car(effects, logs))), least)
+    least = max(_LEAST_OFF, np.exp(CONFLICT_SIGMA * scale_std)) if scale_std < 1 else np.inf
+    best = found_by(lambda run, one: gains_and_errors(run, one)[1])
+    gains, errors = zip(*map(gains_and_errors, some, best), strict=True)
+    rig = LikeliestRig(gains, errors, least)
+    if not any(one.any() for one in rig.misread_signals(some)):
+        return rig
+    return replace(rig, as_read=list(map(_as_read, some, found_by(_as_read))))
+
+
+def gains_and_errors(run: Run, prediction: Array) -> tuple[Array, Array]:
+    """How many times what a model does the signals of a run read (1 + s,), and NRMSE of the model times that."""
+    read, model = _motions(run, prediction)
+    gains = (read * model).sum(axis=1) / np.maximum((model**2).sum(axis=1), 1e-300)
+    return gains, _sizes(read - gains[:, None] * model) / np.maximum(_sizes(read), 1e-300)
+
+
+def _as_read(run: Run, prediction: Array) -> Array:
+    """NRMSE of the signals of a run (1 + s,)."""
+    read, model = _motions(run, prediction)
+    return np.asarray(_sizes(read - model) / np.maximum(_sizes(read), 1e-300))
+
+
+def _motions(run: Run, prediction: Array) -> tuple[Array, Array]:
+    """The signals of a run and of a model (1 + s, n), without their means."""
+    both = np.stack([run.measured_mps2, *run.more]), prediction.reshape(-1, run.count)
+    read, model = (one[:, run.first:] - one[:, run.first:].mean(axis=1, keepdims=True) for one in both)
+    return read, model
+
+
+def _sizes(samples: Array) -> Array:
+    return np.asarray(np.linalg.norm(samples, axis=1))
 
 
 def _first_part(run: Run) -> Run:

@@ -124,6 +124,8 @@ class LabDiagnosis:
     force_gain           of the refitted model, as ``force_gain``; None: as they say
     excess_of            as ``excess``, by signal; empty: the sensor's acceleration
     band                 in which the runs were compared; None: all
+    overfit              share of the noise's power that its fitted numbers, which chance moves, add on what no fit saw:
+                         their count over that of samples (H. Akaike, Ann. Inst. Statist. Math. 21, 1969)
     state                of the model that it ends with
     car                  numbers and laws as fitted
     coloured             whether the noise has a colour: it is louder at some frequencies than at the highest
@@ -170,6 +172,7 @@ class LabDiagnosis:
     best_linear: float | None = None
     shows_forces: bool = False
     over_noise: float = 0.0
+    overfit: float = 0.0
     proportional: float = 1.0
 
     @property
@@ -197,8 +200,8 @@ class LabDiagnosis:
 
     @property
     def reaches_floor(self) -> bool:
-        """Whether the error on what no fit saw is the noise floor's."""
-        return self.steps[-1].error < (1 + UNEXPLAINED) * self.noise_floor_error
+        """Whether the error on what no fit saw is the noise floor's, and what its fitted numbers add there."""
+        return self.steps[-1].error < (1 + UNEXPLAINED) * self.noise_floor_error * (1 + self.overfit)**0.5
 
     @property
     def unexplained(self) -> bool:
@@ -368,6 +371,8 @@ def assess(posterior: Posterior, effects: Mapping[str, Effect], present: Sequenc
         removed=removed, band=compared_band(fine.runs.runs), signals=signal_errors_of(fine, baseline, state),
         shows_forces=fine.shows_forces, best_linear=_best_linear(selection),
         signals_off=signals_off(fine.record_errors, state.record), excess_of=excess_of,
+        overfit=(len(state.logs) + len(free_parameters_of(state.effects))) / sum(
+            run.count - run.first for run in fine.runs.runs),
         force_gain=force_gain(selection.before.linear),
         state=state, car=fitted_car(fine, baseline, state), tolerance=posterior.tolerance.share,
     )

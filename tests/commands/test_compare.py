@@ -54,6 +54,7 @@ def test_for_a_person(runs: list[str], capsys: pytest.CaptureFixture[str]) -> No
     assert lines[0].startswith("The model lacks something: ")
     assert re.search(r"NRMSE 0\.\d{3} \(residual [\d.]+ over measured [\d.]+ m/s2 r\.m\.s\.\)\.", " ".join(lines))
     assert "Next: ridelog diagnose" in " ".join(reported.split())
+    assert "Noise floor: at most 0." in " ".join(reported.split())
     assert all(len(line) <= 100 for line in lines)
     assert "wheel hop" in reported and "\nrun1 " in reported
     tables = reported[reported.index("By band"):reported.index("rav4-2009 on")]

@@ -8,11 +8,13 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cache
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 import pytest
+from scipy.interpolate import CubicSpline
 from scipy.signal import butter, lsim, sosfiltfilt
 
 import ridelog
@@ -20,6 +22,7 @@ from logger.api.lab.bench import bench_with
 from logger.api.lab.question import CompareQuestion
 from logger.commands.main import main
 from logger.errors import BadInput
+from logger.lab.another_car import LikeliestRig
 from logger.lab.laws.draft import LawContext
 from logger.lab.laws.families.hum import FAMILY as HUM
 from logger.lab.likelihood.map_fit import align, fit_to_the_end
@@ -916,18 +919,20 @@ def test_waves_below_the_bounce_of_a_rig_that_nobody_knows_say_nothing_of_its_wa
     assert main(["compare", "--vehicle", str(tmp_path / "bench.yaml"), str(run)]) == 0
 
 
-@pytest.mark.parametrize(("pushed", "guide_n", "words"), [
-    (-1.0, 0.0, "Forces of the opposite sign would explain most"), (1.0, 0.0, None),
-    *slow((0.22481, 0.0, "Forces several times as large would explain most"), (1.0, 1.0, None))],
-    ids=["sign", "right", "pounds", "friction"])
+@pytest.mark.parametrize(("acts", "pushed", "guide_n", "words"), [
+    (1.0, -1.0, 0.0, "Forces of the opposite sign would explain most"), (1.0, 1.0, 0.0, None),
+    (1.9, 1.0, 0.0, None), (0.0, 1e-4, 1.0, None),
+    *slow((1.0, 0.22481, 0.0, "Forces several times as large would explain most"), (1.0, 1.0, 1.0, None))],
+    ids=["sign", "right", "a correction less than the force", "one that explains little", "pounds", "friction"])
 def test_a_force_that_is_not_what_it_says_is_said(
-        pushed: float, guide_n: float, words: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Beside a base that moves it more."""
+        acts: float, pushed: float, guide_n: float, words: str | None, tmp_path: Path,
+        capsys: pytest.CaptureFixture[str]) -> None:
+    """Beside a base that moves it more; its body was weighed."""
     bench, push = Bench(2.5, 900.0, 12.0, 0.0, 0.4, 5400.0, guide_n=guide_n), noise(20.0, 2.0, 2)
     base = noise(15.0, 0.006, 1)
-    record = {"accel_z_mps2": bench.moved(base, push, NOTHING)["accel_z_mps2"]}
+    record = {"accel_z_mps2": bench.moved(base, lambda t: acts * push(t), NOTHING)["accel_z_mps2"]}
     run = written(tmp_path / "run", record, {"elevation_m": base(TIME_S), "force_n": pushed * push(TIME_S)}, BODY)
-    (tmp_path / "bench.yaml").write_text(bench.yaml)
+    (tmp_path / "bench.yaml").write_text(bench.yaml.replace("2.5", "2.5 +- 1%"))
     assert main(["compare", "--vehicle", str(tmp_path / "bench.yaml"), str(run)]) == 0
     found = " ".join(capsys.readouterr().out.split())
     assert words in found if words else "Forces" not in found
@@ -1058,18 +1063,51 @@ def test_the_zeros_of_sensors_are_in_no_error(tmp_path: Path, capsys: pytest.Cap
     assert errors[1] == pytest.approx(errors[0], rel=1e-3) and errors[1] < 0.01
 
 
-@pytest.mark.slow
-def test_another_unit_of_another_signal_is_said(tmp_path: Path) -> None:
+@pytest.mark.parametrize(("times", "words"), [
+    (-1.0, r"found -\S+ times what the model says: it looks like the opposite sign \("), *slow(
+        (1000.0, r"expected displacement_m in m, found \d+ times .* it looks like mm \("), (2.0, None))],
+    ids=["turned over", "mm", "twice"])
+def test_another_unit_or_sign_of_another_signal_is_said(tmp_path: Path, times: float, words: str | None) -> None:
     """Its spring a third too soft in the file; a gain of two is no unit."""
     bench, push, seen = ringing(6.0)
     (tmp_path / "bench.yaml").write_text(bench.yaml.replace("2000.0", "1500 +- 30%"))
-    runs = [written(tmp_path / f"times-{times}", {"accel_z_mps2": seen["accel_z_mps2"],
-                                                  "displacement_m": times * seen["displacement_m"]},
-                    {"force_n": push(TIME_S)}, BODY) for times in (1000, 2)]
-    asked = ["compare", "--vehicle", str(tmp_path / "bench.yaml")]
-    with pytest.raises(BadInput, match=r"expected displacement_m in m, found \d+ times .* it looks like mm \("):
-        main([*asked, str(runs[0])])
-    assert main([*asked, str(runs[1])]) == 0
+    run = written(tmp_path / "run", {"accel_z_mps2": seen["accel_z_mps2"],
+                                     "displacement_m": times * seen["displacement_m"]}, {"force_n": push(TIME_S)}, BODY)
+    asked = ["compare", "--vehicle", str(tmp_path / "bench.yaml"), str(run)]
+    if words is None:
+        assert main(asked) == 0
+    else:
+        with pytest.raises(BadInput, match=words):
+            main(asked)
+
+
+@pytest.mark.slow
+def test_a_wheel_s_accelerometer_in_g_is_told_though_no_numbers_are_known(tmp_path: Path) -> None:
+    bench, push, base = Bench(2.5, 900.0, 12.0, 0.0, 0.4, 5400.0), noise(20.0, 8.0, 2), noise(15.0, 2e-3, 1)
+    seen = bench.moved(base, push, NOTHING)
+    wheel = CubicSpline(TIME_S, seen["wheel_m"])(TIME_S, 2) / 9.80665
+    text = bench.yaml
+    for number in ("2.5", "0.4", "900.0", "12.0", "5400.0"):
+        text = text.replace(f" {number}", f" {0.9 * float(number):g} +- 50%")
+    (tmp_path / "bench.yaml").write_text(text)
+    run = written(tmp_path / "run", {"accel_z_mps2": seen["accel_z_mps2"], "wheel_mps2": wheel},
+                  {"elevation_m": base(TIME_S), "force_n": push(TIME_S)},
+                  BODY + "signals: {wheel_mps2: {measures: acceleration, of: wheel}}\n")
+    with pytest.raises(BadInput, match=r"expected wheel_mps2 in m/s2, found 0\.1\d+ times .* it looks like g \("):
+        main(["compare", "--vehicle", str(tmp_path / "bench.yaml"), str(run)])
+
+
+@pytest.mark.parametrize(("gains", "errors", "as_read", "is_misread"), [
+    ([1.0, 9.8], [0.1, 0.1], None, True), ([1.0, -1.0], [0.1, 0.1], None, True),
+    ([1.0, 9.8], [0.1, 0.1], [0.1, 0.2], False),  # another rig explains it as it was read
+    ([9.8, 9.8], [0.1, 0.1], None, False),  # so does the first signal
+    ([1.0, 9.8], [0.5, 0.1], None, False), ([1.0, 9.8], [0.1, 0.5], None, False),
+    ([1.0, 4.0], [0.1, 0.1], None, False)])
+def test_a_signal_is_misread_where_it_alone_follows_times_a_factor(
+        gains: list[float], errors: list[float], as_read: list[float] | None, is_misread: bool) -> None:
+    run = SimpleNamespace(signals=[SimpleNamespace(measures="acceleration")])
+    rig = LikeliestRig([np.array(gains)], [np.array(errors)], 5.0, [] if as_read is None else [np.array(as_read)])
+    assert rig.misread_signals([run])[0].tolist() == [is_misread]  # type: ignore[list-item]
 
 
 @pytest.mark.parametrize(("damper", "refused"), [("1500 +- 20%", True), *slow(("unknown", False))])

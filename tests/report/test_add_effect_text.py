@@ -10,7 +10,7 @@ import numpy as np
 from logger.api.lab.compare import addition_json, bias, errors, judgement, moved_blocks
 from logger.lab.residuals.unexplained import OFFSET, Drift, Removed
 from logger.lab.selection.add_effect import AddedEffects, ShiftedNumber
-from logger.report.blocks import Table
+from logger.report.blocks import Hint, Table
 from logger.store.formats.effect_file import shipped_effects
 from logger.vehicle.effect import chosen
 from logger.vehicle.uncertain import NumberErrors
@@ -106,6 +106,15 @@ def test_the_rows_fit_their_heads_and_mark_what_was_biased() -> None:
     assert all(len(row) == len(table.heads) for row in rows)
     assert rows[1] == ("sprung_mass_kg", "876", "-3.3%", "+0.1% ± 0.9%", "+4.0", "was biased")
     assert rows[2][-1] == ""
+
+
+def test_of_a_rig_no_distances_are_spoken_of_and_no_change_is_relative_to_a_guess() -> None:
+    table, hint = moved_blocks([replace(MASS, left_open=True)])
+    assert isinstance(table, Table) and isinstance(hint, Hint)
+    assert table.rows == [("sprung_mass_kg", "876", "-3.4%", "± 0.9%", "+4.0", "was biased")]
+    assert "or to Now where that is a guess" in str(hint)
+    words = [row[-1] for row in errors(replace(FOUND, on_rig=True)).rows]
+    assert words[0] == "vehicle's file as it is" and not any("distances" in one for one in words)
 
 
 def test_the_object_has_what_the_contract_promises_and_is_of_the_effect_that_was_added() -> None:

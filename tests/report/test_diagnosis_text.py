@@ -62,6 +62,12 @@ def shape() -> Shape:
 # --- sentences ---
 
 
+def test_few_samples_leave_more_than_noise_of_what_no_fit_saw() -> None:
+    error = 1.12 * FOUND.noise_floor_error
+    short = replace(FOUND, steps=(*FOUND.steps[:-1], FOUND.steps[-1]._replace(error=error)), overfit=5 / 55)
+    assert short.reaches_floor and not replace(short, overfit=5 / 1000).reaches_floor
+
+
 def test_nothing_is_missing_where_there_is_no_more_than_noise() -> None:
     nothing, errors = diagnosis_summary(NOTHING)
     assert nothing.startswith("Nothing is missing: ")
@@ -170,6 +176,10 @@ def test_what_no_candidate_explains_is_said_and_so_are_imitations_that_are_not_n
     imitating = replace(found, candidates=(candidate("tire_damping", 1e-5, 40.0), *OTHERS[1:]))
     _, imitation, _ = diagnosis_summary(imitating)
     assert imitation.startswith("ridelog does not name an effect that gains less than 10% of what a full ")
+    lowering = replace(imitating, candidates=(replace(imitating.candidates[0], error=0.05), *OTHERS[1:]))
+    _, refused, _ = diagnosis_summary(lowering)
+    assert refused == ("ridelog does not name tire_damping, though it lowers the NRMSE: its parameters are beyond what "
+                       "the runs show.")
 
 
 def test_numbers_outside_their_tolerance_are_named_with_how_far_they_are_off() -> None:

@@ -21,8 +21,12 @@ from logger.dsp.whole_record import thinned
 from logger.errors import BadInput, as_bad_input
 from logger.identification.noise_models import DOUBT
 from logger.identification.time_scale import at_time_scale
+<<<<<<< HEAD
 from logger.lab import road_match
 from logger.lab.another_car import LikeliestRig, another_car, error_with_best_effect, likeliest_rig
+=======
+from logger.lab.another_car import LikeliestRig, another_car, error_with_best_effect, gains_and_errors, likeliest_rig
+>>>>>>> b4604814 (A further signal of a rig that alone has another unit or sign is refused: a wheel's accelerometer in g (masses +778 %), a displacement turned over; compare's floor is one at most where the model lacks something, add-effect speaks of no distances on rigs, learn allows for few samples, and why the head of a table is not named is said)
 from logger.lab.likelihood.lag import SLOWEST_MPS
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.whittle import BLOCK_S, HIGHEST_OF_RATE
@@ -76,8 +80,9 @@ _UNITS = (
 _LENGTHS = (("mm", 1000.0), ("cm", 100.0), ("inches", 12 / FOOT_M))
 _SIZES = {"force": (("kN", 1e-3), ("kgf", 1 / STANDARD_GRAVITY_MPS2), ("lbf", 1 / LBF_N)), "length": _LENGTHS,
           "velocity": tuple((f"{unit}/s", size) for unit, size in _LENGTHS),
-          "acceleration": tuple((unit, size) for what, unit, size in _UNITS if what == _RECORD)}
-_KINDS = {"displacement": "length", "travel": "length"}
+          "acceleration": tuple((unit, size) for what, unit, size in _UNITS if what == _RECORD),
+          "turning": (("deg/s", 180 / np.pi),)}
+_KINDS = {"displacement": "length", "travel": "length", "pitch_rate": "turning", "roll_rate": "turning"}
 _APART = 2.0  # kgf and lbf are
 _NO_EFFECT = 20.0  # by so many times no effect and no resonance change all of a signal (a judgement)
 _NOT_DRIVEN, _FEWEST_AT_REST = 0.01, 50
@@ -103,7 +108,7 @@ def check_model(word: str, model: CarModel, runs: SimulatedRuns, warn: Callable[
     rig = _likeliest_rig(model, runs, predictions, tolerance)
     # One after the other: whether it is the car is asked of runs that are right, and takes seconds.
     _say(chain(_other_ways_up(followed, rig), _other_units(runs, followed),
-               _other_units_on_rig(runs, rig), _other_units_of_signals(runs, predictions),
+               _other_units_on_rig(runs, rig), _other_units_of_signals(runs, predictions, rig),
                _other_roads(runs, followed, car),
                _another_car(word, model, runs, predictions, known, tolerance.largest)), warn, anyway)
     return predictions
@@ -241,15 +246,20 @@ def _likeliest_rig(model: CarModel, runs: SimulatedRuns, predictions: Sequence[A
                           list(compress(predictions, driven)), tolerance) if any(driven) else None
     if found is None:
         return None
-    gains, errors = np.ones(len(driven)), np.full(len(driven), np.inf)
-    gains[driven], errors[driven] = found.gains, found.errors
-    return replace(found, gains=gains, errors=errors)
+    def of_all(some: Sequence[Array], otherwise: float) -> list[Array]:
+        each = iter(some)
+        return [next(each) if one else np.full(1 + len(run.signals), otherwise)
+                for one, run in zip(driven, runs.runs, strict=True)]
+
+    return replace(found, gains=of_all(found.gains, 1.0), errors=of_all(found.errors, np.inf),
+                   as_read=of_all(found.as_read, np.inf) if found.as_read else ())
 
 
 def _other_units_on_rig(runs: SimulatedRuns, rig: LikeliestRig | None) -> Iterator[str]:
     """That what rigs did, or what drives them, was written in another unit."""
-    for run, gain in () if rig is None else zip(compress(runs.runs, rig.is_misread), rig.gains[rig.is_misread],
-                                                strict=True):
+    if rig is None:
+        return
+    for run, (gain, *_) in compress(zip(runs.runs, rig.gains, strict=True), rig.is_misread):
         main, track = run.facts.main, run.track
         assert isinstance(track, Excitation)
         drives = {"force": "force_n"} if track.forces else {"displacement": (
@@ -265,19 +275,27 @@ def _other_units_on_rig(runs: SimulatedRuns, rig: LikeliestRig | None) -> Iterat
                + (f"it looks like {likely}" if likely else "is a column in another unit?"))
 
 
-def _other_units_of_signals(runs: SimulatedRuns, predictions: Sequence[Array]) -> Iterator[str]:
-    """Which further signals were written in another unit, that differs by more than any missing effect makes them do.
-    """
-    for run, prediction in zip(runs.runs, predictions, strict=True):
-        for signal, read, model in zip(run.signals, run.more, prediction.reshape(-1, run.count)[1:], strict=True):
+def _other_units_of_signals(runs: SimulatedRuns, predictions: Sequence[Array], rig: LikeliestRig | None
+                            ) -> Iterator[str]:
+    """Which further signals have another sign or unit: those that follow the model, times a factor, though the first
+    signal is as it says, and those that differ by more than any missing effect makes them do."""
+    if rig is None:
+        plain = list(map(gains_and_errors, runs.runs, predictions))
+        rig = LikeliestRig([gain for gain, _ in plain], [error for _, error in plain], np.inf)
+    misread = rig.misread_signals(runs.runs)
+    for run, prediction, gains, off in zip(runs.runs, predictions, rig.gains, misread, strict=True):
+        models = prediction.reshape(-1, run.count)[1:]
+        for signal, read, model, gain, is_off in zip(run.signals, run.more, models, gains[1:], off, strict=True):
             moved = float(model[run.first:].std())
-            gain = float(read[run.first:].std()) / moved if moved else np.nan
+            if not is_off:
+                gain = float(read[run.first:].std()) / moved if moved else np.nan
             sizes = [(unit, size) for unit, size in _SIZES.get(_KINDS.get(signal.measures, signal.measures), ())
-                     if abs(log(size)) > log(_NO_EFFECT) and 1 / _APART < gain / size < _APART]
-            if sizes:
-                unit, _ = min(sizes, key=lambda one: abs(log(gain / one[1])))
+                     if (is_off or abs(log(size)) > log(_NO_EFFECT)) and 1 / _APART < abs(gain) / size < _APART]
+            if sizes or is_off:
+                unit, _ = min(sizes, key=lambda one: abs(log(abs(gain) / one[1])), default=("another unit", 0))
+                turned = gain < 0 and abs(log(-gain)) < log(SENSOR_GAIN.parameters[0].high)
                 yield (f"{run.name}: expected {signal.name} in {signal.unit}, found {gain:.3g} times what the model "
-                       f"says: it looks like {unit}")
+                       f"says: it looks like {'the opposite sign' if turned else unit}")
 
 
 def _other_roads(runs: SimulatedRuns, followed: _Followed, car: Car) -> Iterator[str]:

@@ -202,7 +202,8 @@ def headline(found: LabComparison) -> list[str]:
     else:
         lines.append(f"{refit} {'raises it to' if after > before / _HELPS else 'leaves it at'} {after:.3f}: small "
                      "errors in the parameters are not the cause.")
-    lines += lab_words.error_words(found.steps, found.floor)
+    # What a model lacks is in its residual, and so in the noise that is estimated from that.
+    lines += lab_words.error_words(found.steps, found.floor, about="at most" if found.missing else "about")
     lines += signal_errors({name: (error, refitted.signals[name]) for name, error in plain.signals.items()},
                            "{}, refitted {}")
     lines += lab_words.removed_words(found.removed, found.band)
@@ -534,13 +535,14 @@ def worst_moment(standing: Standing) -> Moment:
 
 def errors(found: AddedEffects) -> Table:
     """The error before, after and of the noise: which of them, the error, its fit, and what it is of."""
+    those, they_are = ("", "as it is") if found.on_rig else (" and distances", "and distances as they are")
     return Table(("", "NRMSE", "Fit", ""), [(which, f"{error:.4f}", f"{fit_percent(error):.1f} %", what)
                                             for which, error, what in (
         ("Before", found.error_before, AS_GUESSED if found.filed == AS_GUESSED else
-         "vehicle's file and distances as they are"),
-        ("", found.error_refitted, f"parameters and distances refitted, on {JUDGED_ON}"),
+         f"vehicle's file {they_are}"),
+        ("", found.error_refitted, f"parameters{those} refitted, on {JUDGED_ON}"),
         ("After", found.error_after, f"refitted with {' and '.join(found.names)}, on {JUDGED_ON}"),
-        ("", found.error_as_written, "new file and distances as they are"),
+        ("", found.error_as_written, f"new file {they_are}"),
         ("Noise floor", found.noise_floor_error, "about; the sensor's noise alone"),
     )], (0, 3))
 
@@ -601,11 +603,13 @@ def moved_blocks(moved: Sequence[ShiftedNumber]) -> list[Block]:
     rows = []
     for one in moved:
         error = _change(one.name, one.found, one.found + one.standard_error)[1:]
-        rows.append((one.name, f"{one.found:.5g}", _change(one.name, one.nominal, one.without),
-                     f"{_change(one.name, one.nominal, one.found)} ± {error}", f"{one.shift:+.1f}",
-                     "was biased" if one.biased else ""))
+        given = one.found if one.left_open else one.nominal
+        rows.append((one.name, f"{one.found:.5g}", _change(one.name, given, one.without),
+                     ("" if one.left_open else f"{_change(one.name, given, one.found)} ") + f"± {error}",
+                     f"{one.shift:+.1f}", "was biased" if one.biased else ""))
+    of = "given value" + ", or to Now where that is a guess" * any(one.left_open for one in moved)
     hint = Hint("Now: the value in the new file. Without, With: refitted without and with the effect, relative to the "
-                "given value, ± standard error. Shift: from Without to With in standard errors; beyond two, the "
+                f"{of}, ± standard error. Shift: from Without to With in standard errors; beyond two, the "
                 "missing effect had biased the parameter.")
     return [Table(("Parameter", "Now", "Without", "With", "Shift", ""), rows, (0, 5)), hint] if rows else []
 

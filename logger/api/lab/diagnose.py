@@ -312,7 +312,13 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
             though = f": if they are right, {imitating} may be an imitation" * bool(imitating)
             lines.append(f"It appears only in {enumerated(found.contradicted_by, 'and')}; the model explains the other "
                          f"signals down to their noise. Check that sensor's position, sign and filter{though}.")
-        if any(one.p_value < FALSE_ALARM and one.effect.name not in found.verdict for one in found.candidates):
+        left = [one for one in found.candidates if one.p_value < FALSE_ALARM and one.effect.name not in found.verdict]
+        lowering = [one.effect.name for one in left if one.error**2 < most_of(found.steps[-1].error**2)]
+        if lowering:
+            contradicted = "the other signals contradict it, or " * bool(found.signals)
+            lines.append(f"ridelog does not name {lowering[0]}, though it lowers the NRMSE: {contradicted}its "
+                         "parameters are beyond what the runs show.")
+        elif left:
             lines.append(f"ridelog does not name an effect that gains less than {IMITATION:.0%} of what a full "
                          "explanation would gain: it may only imitate what is missing.")
     elif found.within_calibration:

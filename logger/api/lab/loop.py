@@ -313,7 +313,7 @@ def ending(story: Story) -> list[str]:
     lines = []
     if story.added:
         lines.append(f"{' and '.join(story.added)} reduced the NRMSE from {models[1][1]:.3f} to {models[-1][1]:.3f}, "
-                     "both refitted. With the last file and the distances as they are, the NRMSE is "
+                     "both refitted. With the last file and the runs as they are, the NRMSE is "
                      f"{story.last.plain.error:.3f}.")
     lines.append(f"Noise floor: about {story.floor:.3f}.")
     if story.refused:
@@ -351,8 +351,8 @@ def as_json(story: Story) -> dict[str, Any]:
     }
 
 
-STEPS_HINT = ("From step 1 on, the lab refits the model's parameters and the distances within their tolerance. With "
-              "the files and distances as they are, the NRMSE is larger.")
+STEPS_HINT = ("From step 1 on, the lab refits the model's parameters within their tolerance, and the distances of "
+              "drives. With the files and runs as they are, the NRMSE is larger.")
 
 
 def story_page(story: Story) -> doc.Html:

@@ -177,10 +177,11 @@ def _alike(one: Drift, other: Drift) -> bool:
 _ERROR_WORDS = {one: f"with {one}" for one in (AS_FILED, AS_GUESSED, REFITTED)}
 
 
-def error_words(steps: Sequence[ErrorStep], floor: float, of: str = f"on {JUDGED_ON}") -> list[str]:
+def error_words(steps: Sequence[ErrorStep], floor: float, of: str = f"on {JUDGED_ON}", about: str = "about"
+                ) -> list[str]:
     """The errors of each step ``of`` what no fit saw, and of the noise alone, and why one rises."""
     each = ", ".join(f"{error_and_fit(one.error)} {_ERROR_WORDS.get(one.words, one.words)}" for one in steps)
-    lines = [f"NRMSE {of}: {each}. Noise floor: about {error_and_fit(floor)}."]
+    lines = [f"NRMSE {of}: {each}. Noise floor: {about} {error_and_fit(floor)}."]
     if rises := rising(steps):
         said = enumerated([_ERROR_WORDS.get(one, one) for one in rises], "and")
         lines.append(f"It rises {said}: what fits a part of the data need not fit the rest. A fit also "

@@ -44,7 +44,7 @@ from logger.vehicle.vehicle import Vehicle
 @dataclass(frozen=True)
 class ShiftedNumber:
     """A parameter of the car: nominal, refitted without the added effects, and with them; with standard errors, which
-    include the prior."""
+    include the prior; and whether less was known of it than is usual, so that the nominal value is a guess."""
 
     name: str
     nominal: float
@@ -52,6 +52,7 @@ class ShiftedNumber:
     without_standard_error: float
     found: float
     standard_error: float
+    left_open: bool = False
 
     @property
     def shift(self) -> float:
@@ -86,6 +87,7 @@ class AddedEffects:
     signals                        errors of other signals than the sensor's acceleration, without and with the effects
     tolerance                      share by which the car's masses, springs and dampers may well be off
     filed                          what is said of the vehicle and effects as they were
+    on_rig                         whether the runs have no distances
     """
 
     vehicle: Vehicle
@@ -106,6 +108,7 @@ class AddedEffects:
     band: ComparedBand | None = None
     tolerance: float = Tolerance().share
     filed: str = AS_FILED
+    on_rig: bool = False
 
     @property
     def gains(self) -> bool:
@@ -168,8 +171,9 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
     without, found = (prior.vehicle(nominal, one.state.logs) for one in (before, after))
     numbers = tuple(
         ShiftedNumber(name, read(nominal, name), read(without, name), read(without, name) * float(was),
-                      read(found, name), read(found, name) * float(now))
-        for name, was, now in zip(prior.names, standard_errors(before).logs, errors.logs, strict=True)
+                      read(found, name), read(found, name) * float(now), bool(known > Tolerance().numbers))
+        for name, was, now, known in zip(prior.names, standard_errors(before).logs, errors.logs, prior.deviations,
+                                         strict=True)
     )
     start, state = posterior.start(present), after.state
     unseen_before, unseen_after = cross_validate(before), cross_validate(after)
@@ -184,7 +188,8 @@ def add(posterior: Posterior, present: Sequence[Chosen], added: Sequence[Chosen]
         excess=excess_over_noise(posterior, state, FALSE_ALARM),
         held_out_gain=unseen_before.deviance - unseen_after.deviance,
         band=compared_band(posterior.runs.runs), signals=signal_errors_of(posterior, before.state, state),
-        tolerance=posterior.tolerance.share, filed=as_filed(posterior.tolerance))
+        tolerance=posterior.tolerance.share, filed=as_filed(posterior.tolerance),
+        on_rig=are_on_rig(posterior.runs.runs))
 
 
 def _fit_with_effects(posterior: Posterior, before: LinearModel, refitted: tuple[Chosen, ...],
