@@ -21,12 +21,8 @@ from logger.dsp.whole_record import thinned
 from logger.errors import BadInput, as_bad_input
 from logger.identification.noise_models import DOUBT
 from logger.identification.time_scale import at_time_scale
-<<<<<<< HEAD
 from logger.lab import road_match
-from logger.lab.another_car import LikeliestRig, another_car, error_with_best_effect, likeliest_rig
-=======
 from logger.lab.another_car import LikeliestRig, another_car, error_with_best_effect, gains_and_errors, likeliest_rig
->>>>>>> b4604814 (A further signal of a rig that alone has another unit or sign is refused: a wheel's accelerometer in g (masses +778 %), a displacement turned over; compare's floor is one at most where the model lacks something, add-effect speaks of no distances on rigs, learn allows for few samples, and why the head of a table is not named is said)
 from logger.lab.likelihood.lag import SLOWEST_MPS
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.whittle import BLOCK_S, HIGHEST_OF_RATE
