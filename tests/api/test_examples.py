@@ -39,7 +39,7 @@ def names(tmp_path_factory: pytest.TempPathFactory, short_dump: Path) -> dict[st
     run = ridelog.simulate("rav4-2009", road, speed_mps=20.0, noise_mps2=0.05)
     ridelog.write_run(folder, run)
     assert main(["replay", str(short_dump), "--out", str(folder / "logs"), "--json"]) == 0
-    car, bumpy = ridelog.read_vehicle("rav4-2009"), ridelog.random_road(iso_class="C", length_m=180.0, seed=2)
+    car, bumpy = ridelog.read_vehicle("rav4-2009"), ridelog.random_road(iso_class="C", length_m=150.0, seed=2)
     wrong = car.with_effect("sensor_gain", gain=1.15)
     runs = [ridelog.simulate(wrong, bumpy, speed_mps, noise_mps2=0.03, name=f"at {speed_mps:g} mps")
             for speed_mps in (9.0, 15.0)]

@@ -19,7 +19,7 @@ from ..support.slow import release
 
 @pytest.fixture(scope="module")
 def runs(tmp_path_factory: pytest.TempPathFactory) -> list[str]:
-    return write_runs(tmp_path_factory.mktemp("friction"), named("dry_friction", friction_force_n=70.0))
+    return write_runs(tmp_path_factory.mktemp("friction"), named("dry_friction", friction_force_n=70.0), lasts_s=12.0)
 
 
 def add(effect: str, vehicle: Path | str, out: Path, *arguments: str) -> int:
@@ -65,7 +65,7 @@ def test_for_a_program_and_once_more(runs: list[str], tmp_path: Path, capsys: py
 
 @pytest.mark.slow
 def test_for_a_person_with_an_effect_of_their_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    runs = write_runs(tmp_path / "runs", named("sensor_offset", offset_m=0.4))
+    runs = write_runs(tmp_path / "runs", named("sensor_offset", offset_m=0.4), lasts_s=10.0)
     own, out = tmp_path / "bracket.py", tmp_path / "mine.yaml"
     own.write_text(OWN, "utf-8")
     out.write_text(vehicle_file("rav4-2009").read_text("utf-8"), "utf-8")

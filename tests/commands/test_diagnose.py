@@ -153,8 +153,8 @@ def test_what_a_car_seldom_has_is_tried_where_all_else_leaves_something_unexplai
     more = {name: EVERY[name] for name in (*FEW, "hysteresis")}
     monkeypatch.setattr("logger.store.formats.effect_file.shipped_effects", lambda: more)
     leaves = named("hysteresis", yield_force_n=150.0, yield_travel_m=0.0015, sharpness_ratio=1.0)
-    for runs, found in ((write_runs(tmp_path / "leaves", leaves), ["hysteresis"]),
-                        (write_runs(tmp_path / "plain", []), [])):
+    for runs, found in ((write_runs(tmp_path / "leaves", leaves, lasts_s=12.0), ["hysteresis"]),
+                        (write_runs(tmp_path / "plain", [], lasts_s=12.0), [])):
         assert diagnose("--json", *runs) == 0
         said = json.loads(capsys.readouterr().out)
         assert said["verdict"] == found

@@ -31,7 +31,7 @@ from logger.vehicle.effect import chosen
 from logger.vehicle.named_parameters import read
 
 from ..support.drives.course import Course, integrated
-from ..support.slow import slow
+from ..support.slow import release, slow
 
 Array = npt.NDArray[np.float64]
 RATE_HZ = 250.0
@@ -251,7 +251,7 @@ def test_what_acts_on_a_single_mass_from_its_guide_is_named(
 
 @pytest.mark.slow
 @pytest.mark.parametrize(("friction_n", "push_n", "names"), [
-    (0.0, 0.0, set()), (0.0, 5.0, {"constant_force"}),
+    (0.0, 0.0, set()), *release((0.0, 5.0, {"constant_force"})),
     (15.0, 5.0, {"constant_force", "dry_friction"})])
 def test_a_free_axis_is_named_what_acts_on_it_by_its_places_alone(
         friction_n: float, push_n: float, names: set[str], tmp_path: Path) -> None:

@@ -71,7 +71,7 @@ WRITERS = {
     "road classify --out": Writer(road, "road classify road.csv --out a.html"),
     "simulate --out": Writer(road, "simulate --vehicle rav4-2009 --profile road.csv --speed 15 --out drive.csv "
                              "--out profile.csv --out a.html"),
-    "iri --out": Writer(road, "iri road.csv --out a.html --out a.pdf --out b.html --out a.png"),
+    "iri --out": Writer(road, "iri road.csv --out a.html --out b.html --out a.png"),
     "comfort --out": Writer(shaken, "comfort shaken.csv --out a.html"),
     "modes --out": Writer(shaken, "modes shaken.csv --method ssi --out a.html"),
     "estimate --out --profile-out": Writer(run, "estimate run --vehicle rav4-2009 --out a.csv --out a.html "

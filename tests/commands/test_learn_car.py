@@ -33,7 +33,7 @@ from logger.vehicle.uncertain import cars_off
 from ..support.command import called
 from ..support.drives.logged_rows import ROW
 from ..support.drives.unmeasured_car import FINE_SENSOR, MPH, UnmeasuredCar, driven, mixed, written
-from ..support.slow import slow
+from ..support.slow import release
 
 CAR = UnmeasuredCar()
 SECONDS = 120.0
@@ -78,7 +78,7 @@ def test_the_file_is_a_vehicle_whose_errors_the_box_can_use(learned: tuple[dict[
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("wrong_m", [2.66 * 1.1, *slow(2.66 * 0.9)])
+@pytest.mark.parametrize("wrong_m", [2.66 * 1.1, *release(2.66 * 0.9)])
 def test_a_wrong_wheelbase_is_named(runs: list[Path], wrong_m: float) -> None:
     found = called("learn-car", *runs, "--wheelbase", wrong_m)
     assert found.returncode == 1 and found.stdout == ""
@@ -184,7 +184,7 @@ def test_what_is_no_drive_is_refused_in_one_line(tmp_path: Path, runs: list[Path
 @pytest.mark.slow
 def test_friction_is_named_and_stays_in_the_errors(learned: tuple[dict[str, Any], Path, Path], tmp_path: Path) -> None:
     """Friction of 60 N acts as damping that is weaker where suspensions move fast."""
-    drives = mixed(replace(CAR, friction_n=60.0), 8, 300.0)
+    drives = mixed(replace(CAR, friction_n=60.0), 8, 2 * SECONDS)
     found = called("learn-car", *written(tmp_path, drives), "--wheelbase", 2.66, "--json")
     assert found.returncode == 0, found.stderr
     answer = json.loads(found.stdout)
@@ -225,7 +225,7 @@ def test_two_cars_are_no_nonlinear_one_where_each_has_its_own_roads(tmp_path: Pa
 @pytest.mark.slow
 def test_last_year_s_file_says_what_changed(learned: tuple[dict[str, Any], Path, Path], tmp_path: Path) -> None:
     worn = UnmeasuredCar(front=(1.25, 0.28, 11.6, 0.12), rear=(1.42, 0.13, 11.1, 0.14))
-    found = called("learn-car", *written(tmp_path, mixed(worn, 6, 2 * SECONDS)), "--wheelbase", 2.66, "--compare",
+    found = called("learn-car", *written(tmp_path, mixed(worn, 6, 1.5 * SECONDS)), "--wheelbase", 2.66, "--compare",
                    learned[1], "--json")
     changes = json.loads(found.stdout)["changes"][0]
     assert "rear damping ratio -" in changes and "front" not in changes
@@ -238,11 +238,11 @@ def test_last_year_s_file_says_what_changed(learned: tuple[dict[str, Any], Path,
 def test_a_limp_damper_and_a_trailer_are_named(tmp_path: Path) -> None:
     """The trailer: an axle 4 m behind the rear one shakes the body by a third of what the rear one does."""
     limp = UnmeasuredCar(rear=(1.42, 0.05, 11.1, 0.14))
-    found = called("learn-car", *written(tmp_path / "limp", mixed(limp, 7, 2 * SECONDS)), "--wheelbase", 2.66)
+    found = called("learn-car", *written(tmp_path / "limp", mixed(limp, 7, 1.5 * SECONDS)), "--wheelbase", 2.66)
     assert found.returncode == 0, found.stderr
     assert "The rear damping ratio of 0.0" in found.stdout and "worn damper" in found.stdout
     towing = []
-    for accel, speed in mixed(CAR, 9, 2 * SECONDS):
+    for accel, speed in mixed(CAR, 9, 1.5 * SECONDS):
         at = np.arange(len(accel))
         towing.append((accel + 0.35 * np.interp(at - 400 / np.maximum(speed, 1.0), at, accel), speed))
     found = called("learn-car", *written(tmp_path / "towing", towing), "--wheelbase", 2.66)

@@ -89,7 +89,8 @@ def test_mass_and_friction_are_found_on_drives_by_newtons_laws_with_honest_error
     """Over draws of the sensor's noise."""
     truth = {MASS: CAR.sprung_mass_kg, FRICTION: FRICTION_N}
     there, starts = [rubbing(60.0)], {MASS: 800.0, FRICTION: 60.0}
-    errors = np.array([off(found([rubbing_run(seed, road_seed=seed % 4)], there, starts), truth) for seed in range(10)])
+    models = [model([rubbing_run(seed, road_seed=seed % 4)], there, starts) for seed in range(10)]
+    errors = np.array([off(fit(one, one.measured, FitOptions(noise=[White()])), truth) for one in models])
     print(f"errors in standard errors: {errors.round(2).tolist()}, r.m.s. {np.sqrt((errors**2).mean()):.2f}")
     assert np.abs(errors).max() < 3.0
     assert 0.7 < np.sqrt((errors**2).mean()) < 1.4

@@ -24,12 +24,12 @@ from .report.pages import Matrix, markdown, page
 
 @pytest.fixture
 def short_drives(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Two runs of 20 s instead of up to four of 60."""
+    """Two runs of 14 s instead of up to four of 60."""
     drawn = cases.draw_drives
 
     def two(rng: np.random.Generator, rough: int) -> tuple[cases.Drive, ...]:
         drives = drawn(rng, rough)
-        return tuple(replace(drive, duration_s=20.0) for drive in (drives + drives)[:2])
+        return tuple(replace(drive, duration_s=14.0) for drive in (drives + drives)[:2])
 
     monkeypatch.setattr(cases, "draw_drives", two)
 

@@ -81,8 +81,8 @@ def test_a_law_of_one_axle_leaves_the_other_alone() -> None:
 
 @pytest.mark.slow
 def test_a_damping_by_the_square_of_the_rate_is_learned_where_no_effect_is_one() -> None:
-    assert learned([chosen(QuadraticDamping(), {})], rougher=2.0).verdict == ("orifice_damping",)
-    law = learned([chosen(QuadraticDamping(), {})], UNKNOWN_SQUARE, rougher=2.0).law
+    assert learned([chosen(QuadraticDamping(), {})], rougher=2.0, lasts_s=10.0).verdict == ("orifice_damping",)
+    law = learned([chosen(QuadraticDamping(), {})], UNKNOWN_SQUARE, rougher=2.0, lasts_s=10.0).law
     assert law is not None
     assert law.draft.family.name == "force_by_rate" and not law.effects and not law.one.where
     assert law.one.values["power_ratio"] == pytest.approx(2.0, abs=0.05)
@@ -111,7 +111,7 @@ class Straight(Family):
 @pytest.mark.slow
 def test_the_law_after_one_that_is_refused_is_learned() -> None:
     right, progress = FAMILIES["force_by_rate"], list[str]()
-    posterior = posterior_of(secret_runs([chosen(QuadraticDamping(), {})], rougher=2.0))
+    posterior = posterior_of(secret_runs([chosen(QuadraticDamping(), {})], rougher=2.0, lasts_s=10.0))
     few = {name: EFFECTS[name] for name in FEW[:2]}
     families = {one.name: one for one in (Straight(right), right)}
     law = learn(posterior, few, families, UNKNOWN_SQUARE, (), progress.append).law
