@@ -455,7 +455,7 @@ class SimulatedRuns:
                           + run.count * (1 + len(run.signals)) // 3)
         with np.errstate(over="ignore", invalid="ignore"):
             found = recorded_signals(car, passage, run.signals, main, zero_is_known(main, run.track))
-        return np.clip(np.nan_to_num(found, nan=MOST_MPS2), -MOST_MPS2, MOST_MPS2)
+        return np.maximum(np.fmin(found, MOST_MPS2), -MOST_MPS2)  # also where it is no number
 
 
 def _slopes(car: Car, passage: Passage, run: Run, around: Sequence[tuple[Car, Car]]) -> Array:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -123,21 +123,24 @@ class Coordinates:
 
 def names(vehicle: Vehicle) -> list[str]:
     """Every name that this vehicle's model has a use for; the joint ones last."""
-    return list(_names(vehicle))
+    return list(_names_of(vehicle))
 
 
-@lru_cache(maxsize=64)
-def _names(vehicle: Vehicle) -> tuple[str, ...]:
-    if vehicle.model in OWN_NAMES:
-        return tuple(OWN_NAMES[vehicle.model])
-    body = [name for name in _BODY if getattr(vehicle, name) is not None]
-    axle = [name for name in _AXLE if _used(vehicle, name)]
-    single = [*body, *(f"front.{name}" for name in axle)]
-    joint: list[str] = []
-    if vehicle.rear is not None:
-        single += [f"rear.{name}" for name in axle]
-        joint = [f"{BOTH}.{name}" for name in axle]
-    return (*single, *(f"{SENSOR}.{name}" for name in _PLACE.get(vehicle.model, ())), *joint)
+def _names_of(vehicle: Vehicle) -> tuple[str, ...]:
+    body = tuple([name for name in _BODY if getattr(vehicle, name) is not None])
+    return _names(vehicle.model, body, vehicle.rear is not None)
+
+
+@cache
+def _names(model: str, body: tuple[str, ...], has_rear: bool) -> tuple[str, ...]:
+    """Of a model, by what it has of a body and axles: a fit asks for them once for each number of each car it tries."""
+    if model in OWN_NAMES:
+        return tuple(OWN_NAMES[model])
+    axle = [name for name in _AXLE if (has_rear if name == "cg_distance_m" else
+                                       model == "full_car" or name != "anti_roll_stiffness_n_m_per_rad")]
+    single = [f"{one}.{name}" for one in (AXLES if has_rear else AXLES[:1]) for name in axle]
+    joint = [f"{BOTH}.{name}" for name in axle if has_rear]
+    return (*body, *single, *(f"{SENSOR}.{name}" for name in _PLACE.get(model, ())), *joint)
 
 
 def sized(vehicle: Vehicle) -> tuple[str, ...]:
@@ -202,13 +205,6 @@ def bounds_of(name: str, value: float) -> tuple[float, float]:
     return value / factor, min(high, _LONGEST_PATCH_M) if name == "contact_patch_m" else high
 
 
-def _used(vehicle: Vehicle, leaf: str) -> bool:
-    """Whether the vehicle's model feels this number of its axles."""
-    if leaf == "cg_distance_m":
-        return vehicle.rear is not None
-    return leaf != "anti_roll_stiffness_n_m_per_rad" or vehicle.model == "full_car"
-
-
 def _axle(vehicle: Vehicle, name: str) -> Axle:
     axle = vehicle.front if name == "front" else vehicle.rear
     assert axle is not None
@@ -217,7 +213,7 @@ def _axle(vehicle: Vehicle, name: str) -> Axle:
 
 def _place(vehicle: Vehicle, name: str) -> tuple[str, str]:
     """The part of a vehicle that a number is of, and what it is called there."""
-    if name not in (known := _names(vehicle)):
+    if name not in (known := _names_of(vehicle)):
         raise ValueError(f"{vehicle.name} has no parameter {name!r}; expected one of {', '.join(known)}"
                          f"{did_you_mean(name, known)}")
     part, _, leaf = OWN_NAMES.get(vehicle.model, {}).get(name, name).rpartition(".")
