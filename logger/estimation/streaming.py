@@ -38,6 +38,8 @@ from logger.vehicle.linearise import KnownCar, MovedCar
 BLOCK_SAMPLES = 2048
 HOP_SAMPLES = 200
 LAG_S = 4.0
+BALANCED_LAG_S = 0.5 * ((BLOCK_SAMPLES - HOP_SAMPLES) / RATE_HZ - ENTRY_S)
+"""Where nobody waits: a place then has as much of a block behind it as before it."""
 FAINT_BELOW = 0.2
 VEHICLE_ERROR = 0.05
 SLOWEST_WAVE_HZ = 0.125  # what is slower cannot be distinguished from drift
@@ -130,6 +132,7 @@ class RoadEstimator:
     driven_share     way that was driven over what the distance says; windows are of that distance
     reads            readings of each sample; more than one only where the sensor is coarse
     noise_log_std    of a noise that is not learned: standard error of its logarithm
+    lag_s            a stretch is taken once the car is so far past it
 
     ``road`` knows what was learned on the way.
     """
@@ -139,10 +142,10 @@ class RoadEstimator:
                  late_std_s: float = 0.0, noise: NoiseBelief | None = None,
                  ride_response: Callable[[Array], Complex] | None = None, ride_ahead_m: float = 0.0,
                  off: Sequence[KnownCar] = (), is_measured: bool = True, driven_share: float = 1.0, reads: int = 1,
-                 noise_log_std: float = 0.0) -> None:
+                 noise_log_std: float = 0.0, lag_s: float = LAG_S) -> None:
         if reads > 1 and not sensor.is_coarse:
             raise ValueError("expected one reading per sample, as the noise blurs the steps")
-        self._reads = reads
+        self._reads, self._lag = reads, round(lag_s * RATE_HZ)
         self._car, self._off, self._is_measured = car, tuple(off), is_measured
         self._driven_share = driven_share
         window_m, ride_ahead_m = window_m * driven_share, ride_ahead_m * driven_share
@@ -221,7 +224,7 @@ class RoadEstimator:
         last = self._waiting if len(self._waiting) else self._samples
         estimates: list[WindowEstimate] = []
         if last is not None:
-            count = round(LAG_S * RATE_HZ) + HOP_SAMPLES - len(self._waiting)
+            count = self._lag + HOP_SAMPLES - len(self._waiting)
             after = RoadSamples.unread(count, float(last.distance_m[-1]), 0.0, self._reads)
             self._heard = _FIRST_SAMPLES
             estimates = self._pushed(after)
@@ -242,7 +245,7 @@ class RoadEstimator:
         self._heard += len(fresh)
         if not self.road.begun and self._heard < _FIRST_SAMPLES:
             return []
-        passed_m = self._samples.distance_m[-1 - round(LAG_S * RATE_HZ)] + 1e-9
+        passed_m = self._samples.distance_m[-1 - self._lag] + 1e-9
         begun = self._next
         while (self._next + 1) * self._piece_m <= passed_m:  # pieces that the car is far enough past
             self._next += 1
