@@ -123,14 +123,14 @@ def has_moved(before: Sitting, now: Sitting) -> str:
 class DriveAlignment:
     """column, sign    of the sensor's axis that is set to point up
 
-    ``moved`` says how the sensor came loose, and when; empty: it did not.
+    ``moved`` says how the sensor came loose, and when; empty: it did not. ``kept_readings`` are in memory.
     """
 
     def __init__(self, column: int, sign: float) -> None:
         self._column = column
         self._sign = sign
         self._readings: list[tuple[Array, Array]] = []
-        self._kept = 0
+        self.kept_readings = 0
         self._fixes: list[tuple[float, float]] = []
         self._known = DelayInformation.none()
         self._part = DelayInformation.none()
@@ -152,12 +152,12 @@ class DriveAlignment:
         if not len(time_s):
             return
         self._readings.append((time_s, accel))
-        self._kept += len(time_s)
+        self.kept_readings += len(time_s)
         if not self._fixes:
             self._forget(float(time_s[-1]) - WAIT_S)
         while self._fixes and time_s[-1] >= self._fixes[0][0] + BLOCK_S + WAIT_S:
             self._end_block()
-        if self._kept > LONGEST_READINGS:
+        if self.kept_readings > LONGEST_READINGS:
             self._fixes.clear()
             self._forget(float(time_s[-1]))
 
@@ -167,11 +167,6 @@ class DriveAlignment:
             self._fixes.clear()
         if not self._fixes or time_s > self._fixes[-1][0]:
             self._fixes.append((time_s, speed_mps))
-
-    @property
-    def kept_readings(self) -> int:
-        """Readings in memory."""
-        return self._kept
 
     def estimate(self) -> DelayEstimate:
         """The delay and forward, as far as they are known by now."""
@@ -226,4 +221,4 @@ class DriveAlignment:
 
     def _forget(self, until_s: float) -> None:
         while self._readings and self._readings[0][0][-1] < until_s - _BEFORE_S - 1.0:
-            self._kept -= len(self._readings.pop(0)[0])
+            self.kept_readings -= len(self._readings.pop(0)[0])

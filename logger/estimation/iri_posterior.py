@@ -178,22 +178,17 @@ def by_slope(row: Array, spacing_m: float) -> Array:
     return np.fft.irfft(np.fft.rfft(row) * _memory_waves(spacing_m, len(row)), len(row))
 
 
-@lru_cache(maxsize=4)
-def _memory(spacing_m: float) -> Array:
-    """Where the variance of the Golden Car's slope comes from, by the way back in steps of the grid; its sum is 1.
+@lru_cache(maxsize=32)
+def _memory_waves(spacing_m: float, length: int) -> Complex:
+    """The rfft, over so many points, of where the variance of the Golden Car's slope comes from, by the way back in
+    steps of the grid; kept, for there are few such numbers.
 
-    Road slopes are nearly white, so it is the square of the response to one step of slope. Most of it comes from the
-    last metre and a half, the rest from as far as the body swings on.
+    Road slopes are nearly white, so it is the square of the response to one step of slope, over its sum. Most of it
+    comes from the last metre and a half, the rest from as far as the body swings on.
     """
     count = 2 * int(_FORGOTTEN_M / spacing_m)
     wave_number_cpm = np.asarray(np.fft.rfftfreq(count, spacing_m), dtype=np.float64)
     per_slope = np.zeros(len(wave_number_cpm), dtype=np.complex128)
     per_slope[1:] = golden_car_slope(wave_number_cpm[1:]) / (2j * pi * wave_number_cpm[1:])
     power = np.fft.irfft(per_slope, count)[: count // 2] ** 2
-    return np.asarray(power / power.sum())
-
-
-@lru_cache(maxsize=32)
-def _memory_waves(spacing_m: float, length: int) -> Complex:
-    """Its rfft over so many points; kept, for there are few such numbers."""
-    return np.asarray(np.fft.rfft(_memory(spacing_m), length))
+    return np.asarray(np.fft.rfft(power / power.sum(), length))

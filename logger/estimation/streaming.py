@@ -373,14 +373,12 @@ class RoadEstimator:
             return [WindowEstimate(number // self._pieces_per_window, nan, nan, resolved, flags, ride)]
         iri = [one.iri for one in pieces]
         own = sqrt(sum(one.own_std_m_per_km**2 for one in iri)) / len(iri)
-        level = sum(one.level_std_m_per_km for one in iri) / len(iri)
-        common = sum(one.common_std_m_per_km for one in iri) / len(iri)
-        mean = sum(one.iri_m_per_km for one in iri) / len(iri)
+        mean, level, common, scatter = (sum(getattr(one, name) for one in iri) / len(iri) for name in (
+            "iri_m_per_km", "level_std_m_per_km", "common_std_m_per_km", "scatter"))
         mean_speed_mps = sum(one.speed_mps for one in pieces) / len(pieces)
         # Ends that happen to be alike do not make a place certain: what they differ by counts half, the other half is
         # what two such ends differ by along the window.
-        change = sqrt((iri[-1].ends_with_m_per_km - iri[0].begins_with_m_per_km) ** 2 / 2
-                       + sum(one.scatter for one in iri) / len(iri))
+        change = sqrt((iri[-1].ends_with_m_per_km - iri[0].begins_with_m_per_km) ** 2 / 2 + scatter)
         misplaced = self._misplaced_m(mean_speed_mps) * change / (len(iri) * self._piece_m)
         std = hypot(own, level, common, misplaced)
         return [WindowEstimate(number // self._pieces_per_window, mean, std, resolved, flags, ride, level, common,
