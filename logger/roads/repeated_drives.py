@@ -80,9 +80,6 @@ def passes_of(way: Ints, start_m: Array, end_m: Array, drive: Ints, time_s: Arra
     window, key, piece_m = window[order], key[order], piece_m[order]
     begin = np.diff(key, prepend=-2).astype(bool) | np.diff(drive[window], prepend=-1).astype(bool)
     begins = np.flatnonzero(begin)
-    if not len(begins):
-        none = np.zeros(0)
-        return Passes(np.zeros(0, np.int64), np.zeros(0, np.intp), none, none, WindowErrors.undivided(none), none)
 
     def total(values: Array) -> Array:
         return np.asarray(np.add.reduceat(values, begins), dtype=np.float64)
