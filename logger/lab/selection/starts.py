@@ -155,16 +155,16 @@ class UnknownNumbers(MeasuredRoad):
             others += [each for some in forms for each in some[1 : self.starts]]
             if ends and ends[0][0] < least:
                 ends += _improved(pool.map, by_squares, refined, _explaining_most(by_squares, _plain(ends)))[0]
-                ends.sort(key=_by_deviance)
-                refined = []
+                ends, refined = _with_plain(by_squares, ends), []
             if near is not None and one.effect is near.effect and ends and ends[0][0] > known - INDISTINGUISHABLE:
                 continue
             # What leaves far more than the effect in whose place it is tried is fitted from its trial alone.
             worth = ends and _explaining_most(by_squares, ends[0][0]) < known
             found.append(Started(one.effect, one.trials, [*refined, *others] if self._done() < enough else [], ends,
                                  without - ends[0][0], known) if worth else one)
-            if ends and ends[0][0] < least and not is_outside_data(base.posterior, ends[0][1].effects[-1]):
-                least, best = ends[0]
+            shown = [end for end in ends if not is_outside_data(base.posterior, end[1].effects[-1])]
+            if shown and shown[0][0] < least:
+                least, best = shown[0]
                 numbers = best.logs if self._shows_the_car(by_squares, anchor, best) else None
         if later:
             self._leave_out(f"other starting points of {', '.join(sorted(later))}")
@@ -200,6 +200,8 @@ class UnknownNumbers(MeasuredRoad):
             if len(alike) < 2 or (alike[1] > alike[0] + INDISTINGUISHABLE and alike[0] < needed):
                 ends.append(by_squares.improved(other[1], to_reach=min([needed, one.known, *alike])))
                 ends.sort(key=_by_deviance)
+        if ends[0] is not one.ends[0]:
+            ends = _with_plain(by_squares, ends)
         self._keep(ends)
         trials = {trial.one.is_plain: trial for trial in reversed(one.trials)}
         needed = _explaining_most(by_squares, _plain(ends))
@@ -348,6 +350,19 @@ def _is_plain(one: _Drawn) -> bool:
 def _plain(ends: Sequence[_Drawn]) -> float:
     """The least deviance of cars whose last effect has its plain form."""
     return min((end[0] for end in ends if _is_plain(end)), default=np.inf)
+
+
+def _with_plain(by_squares: BySquares, ends: Sequence[_Drawn]) -> list[_Drawn]:
+    """Ends, and where the plain form of the best one ends that begins there, if that has refinements: the car to which
+    they led may do without."""
+    found, best = sorted(ends, key=_by_deviance), min(ends, key=_by_deviance)[1]
+    *others, last = best.effects
+    if not last.is_plain:
+        usual = {name: last.effect.usual[name] for name in last.effect.refinements}
+        if (begun := by_squares.at([*others, replace(last, values={**last.values, **usual})], best.logs, best)
+            ) is not None:
+            found.append(by_squares.improved(begun[1], to_reach=_plain(ends)))
+    return sorted(found, key=_by_deviance)
 
 
 def _explaining_most(by_squares: BySquares, deviance: float) -> float:

@@ -717,7 +717,7 @@ class Search(Generic[M, P, F]):
         here = next(one for one in now.effects if one.effect.name == name)
         may_be = [one for one in self.effects if one.name not in names_of(now) and (
             shared_parameters(one, here.values) or (added_to is None and one.name in self._promising))]
-        if not may_be if added_to is not None else self._stops_before(_OTHERS):
+        if (added_to is not None and not may_be) or self._stops_before(_OTHERS):
             return now
         self.progress(f"fitting {name} again" if added_to is None else
                       f"is it {name}, or {' or '.join(one.name for one in may_be)}?")

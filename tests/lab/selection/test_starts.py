@@ -150,12 +150,13 @@ def test_refinements_are_followed_where_they_may_explain_most_of_what_the_plain_
         monkeypatch.setattr(starts.CandidateFit, "of", lambda *given: fit)
         monkeypatch.setattr(starts, "fit_roughly", lambda *given: [])
         search.fitted_roughly(base.score, base, one, 0.0)
-        return [False in screened, False in fitted, True in fitted]
+        return [False in screened, (True, begun - 100) in calls, False in fitted, True in fitted]
 
-    assert ends_at(begun + 100, begun + 100) == [False, False, True]
-    assert ends_at(begun - 100, begun - 120) == [True, False, True]
+    assert ends_at(begun + 100, begun + 100) == [False, False, False, True]
+    assert ends_at(begun - 100, begun - 90) == [True, False, False, True]
+    assert ends_at(begun - 100, begun - 120) == [True, True, False, True]  # the plain form begins where it ended
     assert all(to_reach == pytest.approx(most) for is_plain, to_reach in calls if not is_plain)
-    assert ends_at(begun - 100, most - 1) == [True, True, True]
+    assert ends_at(begun - 100, most - 1) == [True, True, True, True]
 
 
 def test_on_a_road_a_car_is_compared_where_it_was_not_where_another_would_have_been() -> None:
