@@ -178,7 +178,7 @@ def combined_drives(records: Sequence[WindowRecord], length_m: float, above_m_pe
     a_w, a_w_std = (_at(mean.key, comfort.key, values) for values in (comfort.iri_m_per_km, comfort.iri_std_m_per_km))
     driven = cells(column(rows, lambda one: one.speed_mps), WindowErrors.undivided(np.zeros(len(rows))))
     speed = repeated_drives.means(driven, repeated_drives.scatter_of(driven))
-    place = _places(rows, drives, np.where(np.isfinite(iri) & np.isfinite(errors.std), 0.0, np.nan), cells, mean)
+    place = _places(drives, np.where(np.isfinite(iri) & np.isfinite(errors.std), 0.0, np.nan), cells, mean)
     visits = repeated_drives.places_to_visit(mean, a_w, a_w_std, length_m, above_m_per_km)
     return CombinedDrives(len(drives), len(records), len(rows), length_m, above_m_per_km, passes, scatter, mean, a_w,
                           a_w_std, _at(mean.key, speed.key, speed.iri_m_per_km), *place,
@@ -196,7 +196,7 @@ def _at(key: np.ndarray, among: np.ndarray, values: Array) -> Array:
     return found
 
 
-def _places(rows: Sequence[WindowRecord], drives: Sequence[Sequence[WindowRecord]], usable: Array,
+def _places(drives: Sequence[Sequence[WindowRecord]], usable: Array,
             cells: Callable[[Array, WindowErrors], repeated_drives.Passes], mean: repeated_drives.Means
             ) -> tuple[Array, Array, Array]:
     """Latitudes, longitudes and headings of cells, as means of points of the sphere and of directions."""

@@ -40,6 +40,7 @@ class Bump:
     start_m: float
     height_m: float
     width_m: float
+    sizes = ("height_m", "width_m")
 
     def __post_init__(self) -> None:
         _check_height(self.height_m)
@@ -65,6 +66,7 @@ class RoadStep:
     start_m: float
     height_m: float
     length_m = 0.0
+    sizes = ("height_m",)
 
     def __post_init__(self) -> None:
         _check_height(self.height_m)
@@ -76,6 +78,7 @@ class RoadStep:
 
 
 Obstacle = Bump | RoadStep
+KINDS: dict[str, type[Bump] | type[RoadStep]] = {"bump": Bump, "step": RoadStep}
 
 
 def _check_height(height_m: float) -> None:
@@ -85,7 +88,6 @@ def _check_height(height_m: float) -> None:
 
 SPEED_SCALE, EACH = "speed_scale", "each"
 _RUN = re.compile(r"run([1-9][0-9]*)\.(.+)")
-_NUMBERS = {"bump": ("start_m", "height_m", "width_m"), "step": ("start_m", "height_m")}
 # How far from its start a number may go when nothing else is said: factors, and metres.
 _HEIGHT_FACTOR, _WIDTH_FACTOR, _SPEED_FACTOR = 20.0, 4.0, 1.5
 _PLACE_M = 5.0
@@ -104,18 +106,18 @@ class RoadInput:
     @property
     def obstacles(self) -> dict[str, Obstacle]:
         """Those there are, by name."""
-        return {name: one for name in _NUMBERS if (one := getattr(self, name)) is not None}
+        return {name: one for name in KINDS if (one := getattr(self, name)) is not None}
 
 
 def input_names(road: RoadInput) -> list[str]:
     """Every number that this input has, by its name for all runs."""
-    return [f"{part}.{leaf}" for part in road.obstacles for leaf in _NUMBERS[part]] + [SPEED_SCALE]
+    return [f"{part}.{leaf}" for part in road.obstacles for leaf in ("start_m", *KINDS[part].sizes)] + [SPEED_SCALE]
 
 
 def is_input(name: str) -> bool:
     """Whether a name is one of a road's numbers, and not of a vehicle's."""
     _, whole = run_and_name(name.removeprefix(f"{EACH}."))
-    return whole == SPEED_SCALE or whole.partition(".")[0] in _NUMBERS
+    return whole == SPEED_SCALE or whole.partition(".")[0] in KINDS
 
 
 def run_and_name(name: str) -> tuple[int | None, str]:

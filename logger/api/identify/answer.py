@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from logger.api.identify.question import MEASURED, OBSTACLES, SAME, IdentifyQuestion
+from logger.api.identify.question import MEASURED, SAME, IdentifyQuestion
 from logger.api.inputs import Model, Run, check_forces, model_of, read_run, run_on_road
 from logger.api.lab.bench import slow_words, word_of
 from logger.api.lab.checks import (
@@ -38,18 +38,8 @@ from logger.identification.identifiability import NotIdentifiable
 from logger.identification.prediction_error_fit import Fit, FitOptions, least_share
 from logger.identification.session import LEAST_SAMPLES, drives_of, error_before, fit_options, obstacle_starts
 from logger.identification.shared_road_covariance import CommonRoughness, may_have_common, with_common_roughness
-from logger.identification.unknown_inputs import (
-    EACH,
-    Bump,
-    RoadInput,
-    RoadStep,
-    expanded,
-    free_input,
-    is_input,
-    run_and_name,
-)
+from logger.identification.unknown_inputs import EACH, KINDS, RoadInput, expanded, free_input, is_input, run_and_name
 from logger.identification.unknown_road.marginal_likelihood import GD_N0, NOISE, OFFSET, Options
-from logger.identification.unknown_road.marginal_likelihood import Options as RoadOptions
 from logger.identification.unknown_road.road_fit import RoadFit, fit_roads
 from logger.lab.readings_fit import ReadingsFit, fit_to_readings
 from logger.left_out import left_out_json, left_out_lines
@@ -151,7 +141,7 @@ def identify(question: IdentifyQuestion) -> Identification:
     drives = [run_on_road(one, question.warn) if not flat_will_do else one if isinstance(one, Run) else read_run(one)
               for one in given]
     model = model_of(with_initial_values(model_of(question.vehicle), drives))
-    records = _records(drives, question, model.vehicle)
+    records = _records(drives, model.vehicle)
     if question.free is None and (question.road != MEASURED or question.obstacles):
         raise question.wrong("free", ": expected the parameters to fit, as the road was not measured")
     if question.road != MEASURED:
@@ -173,7 +163,7 @@ def _narrowed(question: IdentifyQuestion, drives: Sequence[Run]) -> IdentifyQues
     return replace(question, low_pass_hz=min((one for one in ends_hz if one is not None), default=None))
 
 
-def _records(drives: Sequence[Run], question: IdentifyQuestion, vehicle: Vehicle) -> list[Record]:
+def _records(drives: Sequence[Run], vehicle: Vehicle) -> list[Record]:
     """Drives with their roads, or on a flat one. BadInput for one too short, or that cannot be what it says, and for
     rates that differ."""
     records = []
@@ -307,16 +297,16 @@ def _check_rigs(records: Sequence[Record], question: IdentifyQuestion) -> None:
 
 def _road(question: IdentifyQuestion) -> tuple[RoadInput, list[str]]:
     """What lies on the road, and the names of what has no start yet. BadInput for what is no bump or step."""
-    kinds, found = {"bump": Bump, "step": RoadStep}, dict[str, Any]()
+    found = dict[str, Any]()
     for name, numbers in (question.obstacles or {}).items():
-        if name not in kinds:
-            raise BadInput(f"obstacle {name}: expected {' or '.join(kinds)}")
-        needed, said = OBSTACLES[name], ",".join(f"{key}={value:g}" for key, value in numbers.items())
+        if name not in KINDS:
+            raise BadInput(f"obstacle {name}: expected {' or '.join(KINDS)}")
+        needed, said = KINDS[name].sizes, ",".join(f"{key}={value:g}" for key, value in numbers.items())
         if not set(needed) <= set(numbers) <= {"start_m", *needed}:
             raise question.wrong("obstacles", f" {name}:{said}: expected [start_m=M,]"
                                               f"{','.join(f'{one}=M' for one in needed)}")
         try:
-            found[name] = kinds[name](**{"start_m": 0.0, **numbers})
+            found[name] = KINDS[name](**{"start_m": 0.0, **numbers})
         except ValueError as error:
             raise question.wrong("obstacles", f" {name}:{said}: {error}") from None
     return RoadInput(**found), [name for name, one in (question.obstacles or {}).items() if "start_m" not in one]
@@ -430,7 +420,7 @@ def _on_unmeasured_roads(given: Model, records: list[Record], question: Identify
                                       "cannot_tell": cannot_tell}, model, cannot_tell)
 
 
-def _road_options(question: IdentifyQuestion) -> tuple[RoadOptions, IdentifyQuestion]:
+def _road_options(question: IdentifyQuestion) -> tuple[Options, IdentifyQuestion]:
     """How to fit, and the question without what is not the car's. BadInput for what needs a known road."""
     unused = {"obstacles": question.obstacles, "low_pass_hz": question.low_pass_hz, "tries": question.tries,
               "noise": question.noise != "auto"}

@@ -8,8 +8,6 @@ from typing import Annotated
 from logger import question
 from logger.api import shared_fields
 
-OBSTACLES = {"bump": ("height_m", "width_m"), "step": ("height_m",)}
-"""What lies on a road, and its numbers beside ``start_m``."""
 MEASURED, UNMEASURED, SAME = "measured", "unmeasured", "same"
 
 

@@ -103,7 +103,7 @@ def check_model(word: str, model: CarModel, runs: SimulatedRuns, warn: Callable[
     followed = _followed(runs, predictions, car, tolerance)
     rig = _likeliest_rig(model, runs, predictions, tolerance)
     # One after the other: whether it is the car is asked of runs that are right, and takes seconds.
-    _say(chain(_other_ways_up(followed, rig), _other_units(runs, followed),
+    _say(chain(_other_ways_up(followed, rig), _other_units(followed),
                _other_units_on_rig(runs, rig), _other_units_of_signals(runs, predictions, rig),
                _other_roads(runs, followed, car),
                _another_car(word, model, runs, predictions, known, tolerance.largest)), warn, anyway)
@@ -211,7 +211,7 @@ def _other_ways_up(followed: _Followed, rig: LikeliestRig | None) -> Iterator[st
                    f"(correlation {max(around.turned, below.turned):.2f})")
 
 
-def _other_units(runs: SimulatedRuns, followed: _Followed) -> Iterator[str]:
+def _other_units(followed: _Followed) -> Iterator[str]:
     """Which runs on roads, or profiles, are in another unit, the nearest one. Below the bounce the body moves with the
     road whatever is missing, but one run holds few such waves: the median of the runs has to be nearer to a unit than
     to 1. A factor that a sensor's gain may be is a unit only if it is one, and all runs and that median agree."""

@@ -245,7 +245,7 @@ def sentences(law: Law, addition: AddedEffects) -> list[str]:
     share = max(law.listed, 0.0) / law.with_law
     lines.append(f"Known effects alone reach {share:.0%} of the evidence of the model with the law (2 ln of the "
                  f"evidence: {law.listed:.0f} of {law.with_law:.0f}).")
-    lines += _nearest(law.nearest, law)
+    lines += _nearest(law.nearest)
     if law.rivals:
         others = [f"{one.title}: {one.shown_by}" for one in law.rivals]
         lines.append(f"These runs cannot distinguish it from {' or '.join(one.title for one in law.rivals)}: "
@@ -254,7 +254,7 @@ def sentences(law: Law, addition: AddedEffects) -> list[str]:
     return lines
 
 
-def _nearest(nearest: Nearest | None, law: Law) -> list[str]:
+def _nearest(nearest: Nearest | None) -> list[str]:
     if nearest is None:
         return ["No known effect of its kind explains any of it."]
     name, gap = nearest.one.effect.name, nearest.law_gain - nearest.gain
