@@ -12,8 +12,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from logger.estimation import batch
 from logger.estimation.sensor_noise import Sensor
-from logger.estimation.streaming import LAG_S, SLOWEST_WAVE_HZ, RoadEstimator, RoadPiece, WindowEstimate
+from logger.estimation.streaming import BALANCED_LAG_S, LAG_S, SLOWEST_WAVE_HZ, RoadEstimator, RoadPiece, WindowEstimate
 from logger.profiles.track import Track
 from logger.roads import iso8608
 from logger.roads.iri import rectified_slope, window_iri
@@ -209,6 +210,17 @@ def test_windows_come_a_few_seconds_after_they_were_driven() -> None:
             seen[window.number] = (low + 50) / 100 - (window.number + 1) * WINDOW_M / 20.0
     late = np.array([seen[number] for number in seen if number > 30])
     assert late.min() > LAG_S - 0.011 and late.max() < LAG_S + 2.5
+
+
+def test_the_desk_knows_a_place_better_with_as_much_behind_it_as_before_it() -> None:
+    sensor, one = Sensor(0.3, 0.0), driven(steady(31.0, 60.0))
+    known_car, reading = LinearCar(car("rav4-2009"), body_point(car("rav4-2009"))), one.read(sensor)
+    stream, desk = ([window.iri_m_per_km for window in estimated(
+        RoadEstimator(known_car, sensor, WINDOW_M, lag_s=lag_s), reading, one.distance_m)]
+        for lag_s in (LAG_S, BALANCED_LAG_S))
+    assert batch.estimated(known_car, sensor, WINDOW_M, reading, one.distance_m)[0].iri_m_per_km.tolist() == desk
+    off, less_off = (np.nanmean((np.array(found)[:len(one.exact)] - one.exact) ** 2) for found in (stream, desk))
+    assert less_off < 0.99 * off
 
 
 def test_a_second_drive_is_numbered_by_its_own_distance() -> None:
