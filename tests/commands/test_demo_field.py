@@ -15,7 +15,7 @@ from logger.store.formats.vehicle_file import read_model
 from tests.support.command import called
 from tests.support.printed import printed, shown, words
 
-FEW = ("dry_friction", "damper_asymmetry", "sensor_gain", "sensor_offset", "time_offset")
+FEW = ("dry_friction", "sensor_gain", "time_offset")
 DOCS = Path(__file__).parents[2] / "docs"
 
 
