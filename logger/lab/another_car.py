@@ -34,7 +34,7 @@ POOR_ERROR, _GOOD_ERROR = 0.8, 0.35
 """From the first error on a model explains next to nothing: a third of the power (1 - 0.8 squared), a judgement. Up to
 the second a car explains a record, or moves like it: nine tenths of the power (0.35 squared is 0.12)."""
 
-_LEAST_OFF = SENSOR_GAIN.parameters[0].high
+(_GAIN,) = SENSOR_GAIN.parameters
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ class LikeliestRig:
         for place, (run, gains, errors) in enumerate(zip(runs, self.gains, self.errors, strict=True)):
             force = np.array([one.measures == "force" for one in run.signals], bool)
             gain = gains[1:] / np.where(force, 1.0, gains[0])
-            least = np.where(force, self.least, _LEAST_OFF)
+            least = np.where(force, self.least, _GAIN.high)
             off = (gain < 0) | (np.abs(np.log(np.maximum(np.abs(gain), 1e-300))) > np.log(least))
             off &= bool(self.explains[place]) & (errors[1:] < _GOOD_ERROR)
             found.append(off & ~(self.as_read[place][1:] < _GOOD_ERROR) if self.as_read else off)
@@ -152,7 +152,7 @@ def likeliest_rig(runs: Sequence[Run], vehicle: Vehicle, effects: Sequence[Chose
         return wide.runs.predict(wide.car(effects, logs))
 
     scale_std = wide.prior.scale_deviation if wide.shows_forces else 0.0
-    least = max(_LEAST_OFF, np.exp(CONFLICT_SIGMA * scale_std)) if scale_std < 1 else np.inf
+    least = max(_GAIN.high, np.exp(CONFLICT_SIGMA * scale_std)) if scale_std < 1 else np.inf
     best = found_by(lambda run, one: gains_and_errors(run, one)[1])
     gains, errors = zip(*map(gains_and_errors, some, best), strict=True)
     rig = LikeliestRig(gains, errors, least)
