@@ -51,6 +51,7 @@ from logger.runs import BY_ROAD, Past, are_on_rig
 from logger.simulation.virtual_drive import steps_hz
 from logger.vehicle import named_parameters
 from logger.vehicle.effect import Chosen, Effect, SensorEffect
+from logger.vehicle.effects.force_gain import EFFECT as FORCE_GAIN
 from logger.vehicle.named_parameters import free_parameters_of
 
 ALREADY_PRESENT = "the model has it"
@@ -293,8 +294,17 @@ def search_to_the_last(posterior: Posterior, effects: Mapping[str, Effect], pres
 
 def search_effects(posterior: Posterior, effects: Mapping[str, Effect], present: Sequence[Chosen] = (),
                    progress: Notify = silent) -> tuple[Search, Selection]:
-    """The search of a diagnosis and its result; arguments as of ``diagnose``."""
+    """The search of a diagnosis and its result; arguments as of ``diagnose``. Where forces of another gain or sign
+    would explain most of what a rig does, it begins with these: what is left without is not the rig's, and effects
+    imitate it (an occupant of twice the body's mass where an actuator pulled as its record pushed)."""
     search, before = begin_search(posterior, effects, present, progress)
+    if FORCE_GAIN in search.effects and force_gain(before.linear) is not None:
+        progress("the forces are not what they say: fitting their gain")
+        begun = search.best_of(FORCE_GAIN, before, {})
+        if begun.hold_out.explains_most_beyond(before.hold_out):
+            tried = search.round(begun, [one for one in search.effects if one is not FORCE_GAIN])
+            return search, search.go_on(Selection(before, begun, {}, {}, tried, ((FORCE_GAIN.name, begun.hold_out),)),
+                                        tried)
     return search, search.run(before)
 
 

@@ -938,6 +938,26 @@ def test_a_force_that_is_not_what_it_says_is_said(
     assert words in found if words else "Forces" not in found
 
 
+@pytest.mark.slow
+def test_where_forces_are_not_what_they_say_the_rest_is_found_with_their_gain(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """An actuator that pulls three times as strongly as its record pushes; the body rubs on its guide."""
+    bench, push = Bench(2.5, 900.0, 12.0, 0.0, 0.4, 5400.0, guide_n=1.0), noise(20.0, 2.0, 2)
+    base = noise(15.0, 0.006, 1)
+    seen = bench.moved(base, lambda t: -3.2 * push(t), NOTHING)["accel_z_mps2"]
+    read = seen + np.random.default_rng(1).normal(0.0, 0.02, len(seen))
+    driving = {"elevation_m": base(TIME_S), "force_n": push(TIME_S)}
+    run = written(tmp_path / "run", {"accel_z_mps2": read}, driving, BODY)
+    (tmp_path / "bench.yaml").write_text(bench.yaml.replace("2.5", "2.5 +- 1%"))
+    assert main(["diagnose", "--vehicle", str(tmp_path / "bench.yaml"), str(run), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert sorted(found["verdict"]) == ["force_gain", "frame_friction"]
+    values = {one["effect"]: one["parameters"] for one in found["candidates"]}
+    assert values["force_gain"]["gain"] == pytest.approx(-3.2, rel=0.02)
+    assert values["frame_friction"]["body_friction_force_n"] == pytest.approx(1.0, rel=0.04)
+    assert found["candidates"][0]["error"] < 0.02 and found["unexplained"] is False
+
+
 def test_what_forces_drive_the_other_way_is_upside_down_or_they_are(tmp_path: Path) -> None:
     """On a base that moves it less."""
     bench, push, base = Bench(2.5, 900.0, 12.0, 0.0, 0.4, 5400.0), noise(20.0, 2.0, 2), noise(15.0, 1e-4, 1)

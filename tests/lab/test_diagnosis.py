@@ -195,7 +195,7 @@ def test_a_sensor_that_explains_little_beside_what_is_unknown_is_not_named(
 
 def test_effects_that_cannot_be_tried_are_named_with_the_reason(flawless: SimulatedRuns, offset: LabDiagnosis) -> None:
     why = {name: EFFECTS[name].obstacle_on(CAR, False, False, False) for name in (
-        "roll", "constant_force", "force_limit")}
+        "roll", "constant_force", "force_gain", "force_limit")}
     assert all(why.values())
     found = obstacles_of(posterior_of(flawless), EFFECTS, [chosen(EFFECTS["sensor_gain"], {"gain": 1.1})])
     assert found == {"sensor_gain": ALREADY_PRESENT, **why}

@@ -182,6 +182,15 @@ def test_what_no_candidate_explains_is_said_and_so_are_imitations_that_are_not_n
                        "the runs show.")
 
 
+def test_a_force_of_another_gain_may_be_in_the_place_of_a_mass() -> None:
+    one = CandidateEffect(chosen(EFFECTS["force_gain"], {"gain": 1.25}), 0.153, 1e-12, 500.0)
+    found = replace(NOTHING, beyond={"sprung_mass_kg": -0.2}, candidates=(one, *OTHERS))
+    assert "forces that count 1.25 times what they say would explain as much" in " ".join(diagnosis_summary(found))
+    for other in (replace(found, beyond={}), replace(found, candidates=(
+            replace(found.candidates[0], error=0.2), *OTHERS))):
+        assert "forces that count" not in " ".join(diagnosis_summary(other))
+
+
 def test_numbers_outside_their_tolerance_are_named_with_how_far_they_are_off() -> None:
     found = replace(NOTHING, beyond={"front.suspension_stiffness_n_per_m": 0.242, "sprung_mass_kg": -0.13},
                     in_conflict=True)

@@ -22,6 +22,7 @@ from logger.chart_data import MOST_DOTS, Array, Bars, Curves, Line
 from logger.errors import BadInput
 from logger.extraction.along_track import MeasuredLine
 from logger.lab.diagnosis import LabDiagnosis
+from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.residuals.fitted_laws import RATE, TRAVEL, BenchForces, ForceCurve
 from logger.lab.residuals.unexplained import Shape
 from logger.lab.selection.detectability import DETECTABLE_SIGMA, Undetectable
@@ -53,6 +54,7 @@ from logger.runs import BY_RECEIVER, UNKNOWN, runs_left_out
 from logger.runs import Run as Record
 from logger.store.formats import drive_file
 from logger.vehicle.effect import Chosen
+from logger.vehicle.effects.force_gain import EFFECT as FORCE_GAIN
 
 _PLACES_EVERY_M = 10.0
 _LEAST_SHARED_M = 50.0
@@ -283,7 +285,8 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
     """What is missing, how certain that is, and what it could be instead: paragraphs. What was removed comes first
     where it is most of the residual, else after the errors."""
     removed = lab_words.removed_by_share(found.removed)
-    lines = [*lab_words.force_words(found.force_gain), *lab_words.filter_words(found.removed, found.band), *(
+    lines = [*lab_words.force_words(None if FORCE_GAIN.name in found.verdict else found.force_gain),
+             *lab_words.filter_words(found.removed, found.band), *(
         one.words for one in removed if one.share >= most_of(1.0))]
     if found.contradicted:
         lines.append(f"The runs contradict the vehicle's file in {enumerated(found.contradicted, 'and')}. The search "
@@ -391,6 +394,11 @@ def _car(found: LabDiagnosis) -> list[str]:
                   "" if found.missing else ", or an effect is missing that acts as such a change does")
         lines.append(f"Parameters beyond their tolerance: {off}. Measure them: {'either ' * bool(either)}the vehicle's "
                      f"file is wrong there{either}.")
+        lines += [f"Masses and forces are known only against each other: forces that count {one.one.p.gain:.3g} times "
+                  "what they say would explain as much. Weigh what moves, or calibrate the force."
+                  for one in found.candidates if one.effect.name == FORCE_GAIN.name and one.p_value < FALSE_ALARM
+                  and one.effect.name not in found.verdict
+                  and one.error < (1 + UNEXPLAINED) * found.steps[-1].error]
     if found.moved:
         lines.append(_moved(found))
     if found.as_moved is not None:
