@@ -260,15 +260,19 @@ def _other_units_on_rig(runs: SimulatedRuns, rig: LikeliestRig | None) -> Iterat
         assert isinstance(track, Excitation)
         drives = {"force": "force_n"} if track.forces else {"displacement": (
             "displacement_m" if track.moves_part else "elevation_m")}
-        sizes = [(main.name, unit, size) for unit, size in _SIZES[_KINDS.get(main.measures, main.measures)]]
+        # An axis is looked at by its rates, whatever was read (``of_rates``).
+        sizes = [(main.name, unit.removesuffix("/s" * main.name.endswith("_m")), size)
+                 for unit, size in _SIZES[_KINDS.get(main.measures, main.measures)]]
         sizes += [(name, unit, 1 / size) for kind, name in drives.items()
                   for unit, size in _SIZES[_KINDS.get(kind, kind)]]
         nearest = min((size for _, _, size in sizes), key=lambda size: abs(log(gain / size)))
         likely = " or ".join(f"{name} in {unit}" for name, unit, size in sizes
                              if abs(size / nearest - 1) < _NEAR and abs(log(gain / nearest)) < log(_APART))
+        forces = f", or forces that count {gain:.3g} times what they say" if track.forces and (
+            abs(gain / nearest - 1) > 0.5 * _NEAR) else ""
         yield (f"{run.name}: expected N, m and m/s2, found {main.name} {gain:.3g} times as large as any rig "
                "within the vehicle's file would give: "
-               + (f"it looks like {likely}" if likely else "is a column in another unit?"))
+               + (f"it looks like {likely}{forces}" if likely else f"a column in another unit{forces}?"))
 
 
 def _other_units_of_signals(runs: SimulatedRuns, predictions: Sequence[Array], rig: LikeliestRig | None
