@@ -225,6 +225,12 @@ class LabDiagnosis:
                       if there.words == f"with {name}")
         return self.is_doubtful or (self.exceeds_noise and left >= IMITATION * (removed + left))
 
+    def left_of(self, signal: str) -> float:
+        """Error that is left of a signal: as far may what makes it have moved the signal's gain; 0 where nothing is
+        missing."""
+        one = self.signals.get(signal)
+        return (self.final_error if one is None else one.after) if self.exceeds_noise else 0.0
+
     @property
     def contradicted_by(self) -> tuple[str, ...]:
         """Signals whose residual alone is above their noise: they contradict the others."""

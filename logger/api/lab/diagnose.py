@@ -331,7 +331,9 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
         lines.append(f"In the worst run the residual is {_left_over(found)}: calibration errors of the sensors may "
                      f"leave as much{of_motion}")
     lines += [f"{name} is {share:+.1%} off against all other signals, more than a calibration error: check its scale "
-              "and its unit. The search for effects corrected it."
+              "and its unit. The search for effects corrected it." if abs(share) > (rest := found.left_of(name)) else
+              f"{name} may be {share:+.1%} off against all other signals. What is missing may cause that as well: it "
+              f"leaves {rest:.1%} of the signal. The search for effects corrected it."
               for name, share in found.signals_off.items()]
     lines += _car(found)
     errors, *rises = lab_words.error_words(found.steps, found.noise_floor_error)
@@ -408,7 +410,8 @@ def _car(found: LabDiagnosis) -> list[str]:
     if found.left_open:
         fitted = enumerated([f"{name} {measured(value, error)} {unit_of(name)}".rstrip()
                              for name, (value, error) in found.left_open.items()], "and")
-        lines.append(f"Fitted parameters that the vehicle's file leaves open: {fitted}.")
+        farther = " What is missing may have moved them farther than these errors say." * found.exceeds_noise
+        lines.append(f"Fitted parameters that the vehicle's file leaves open: {fitted}.{farther}")
     return lines
 
 

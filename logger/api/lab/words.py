@@ -101,8 +101,8 @@ def removed_by_share(found: Removed) -> list[RemovedCause]:
         causes.append(RemovedCause(distance, "wrong distances", size, (
             f"The distances of these runs are off by {size}, more than usual. {corrected}")))
     if found.clock_ppm:
-        causes.append(RemovedCause(distance, "another clock", f"{found.clock_ppm:+.2g} ppm", (
-            f"The recorder's clock runs {abs(found.clock_ppm):.2g} ppm "
+        causes.append(RemovedCause(distance, "another clock", f"{found.clock_ppm:+.0f} ppm", (
+            f"The recorder's clock runs {abs(found.clock_ppm):.0f} ppm "
             f"{'faster' if found.clock_ppm > 0 else 'slower'} than that of the excitation. {corrected}")))
     if found.drifting_sensors:
         size = drift_words(found)

@@ -89,8 +89,8 @@ _LOG_DEVIATIONS = np.array([0.5, 1.5, 0.5])
 class RecordError:
     """Errors of the record of one run, by numbers k: those of its distance (coefficients of the spline, the delay
     of its places if they may have one, the scale, the share of its roughness), then two of its recorder (gain, droop),
-    and the gain of each further signal. None of these sensors is quite right, and one that is wrong by a per cent would
-    else contradict the others wherever it is hundreds of times its noise.
+    gain and lag of each further signal. None of these sensors is quite right, and one that is wrong by a per cent or
+    read a millisecond later would else contradict the others wherever it is hundreds of times its noise.
 
     basis          what each of the distance's numbers adds to the distance (k - 2, n) [m]; sparse: of a spline's, four
                    are not 0 at a sample
@@ -127,14 +127,16 @@ class RecordError:
 
     @cached_property
     def _recorder_deviations(self) -> Array:
-        """Standard deviations of the numbers of the recorder and of the further signals (2 + s,), and of the zero of a
+        """Standard deviations of the numbers of the recorder and of further signals (2 + 2 s,), and of the zero of a
         part's force. What a part pulls back with at its rest depends on gas, weight and how its sensor was set to zero:
-        any force as large as those measured is as likely."""
+        any force as large as those measured is as likely. Channels that are read in turn lie anywhere within half a
+        sample."""
         signals = (self.run.facts.main, *self.run.signals)
         gain, *gains = (self.tolerance.gain_of(one) for one in signals)
         gain = gain if gain >= self.scale_std else _HELD * gain
         zero = [float(np.sqrt(np.mean(self.run.kept_readings_mps2**2))) or 1.0] if self.has_zero else []
-        return np.array([gain, self.tolerance.droop, *gains, *zero])
+        lags_s = [1 / (self.run.rate_hz * np.sqrt(12))] * len(gains)
+        return np.array([gain, self.tolerance.droop, *gains, *lags_s, *zero])
 
     @property
     def has_zero(self) -> bool:
@@ -150,6 +152,10 @@ class RecordError:
     def signal_gains(self, k: Array) -> Array:
         """By what share each further signal reads too much (s,)."""
         return k[self.places + 2 : self.places + 2 + len(self.run.signals)]
+
+    def _signal_lags_s(self, k: Array) -> Array:
+        """By how much each further signal is later than the first (s,)."""
+        return k[self.places + 2 + len(self.run.signals) :][: len(self.run.signals)]
 
     @property
     def places(self) -> int:
@@ -240,8 +246,10 @@ class RecordError:
             found += k[-1] * self._zero_slope
         if len(main) == len(prediction):
             return found
-        others = prediction[len(main) :].reshape(-1, len(main)) * (1 + self.signal_gains(k))[:, None]
-        return np.concatenate([found, others.ravel()])
+        others = prediction[len(main) :].reshape(-1, len(main))
+        if (lags_s := self._signal_lags_s(k)).any():
+            others = np.stack([_later(one, lag_s, self.run.rate_hz) for one, lag_s in zip(others, lags_s, strict=True)])
+        return np.concatenate([found, (others * (1 + self.signal_gains(k))[:, None]).ravel()])
 
     @cached_property
     def _zero_slope(self) -> Array:
@@ -263,6 +271,7 @@ class RecordError:
             recorded = np.zeros((count, n))
             if start:
                 recorded[1 + signal] = prediction[start : start + n]
+                recorded[1 + len(self.run.signals) + signal] = -rise
             else:
                 recorded[:2] = _recorder_slopes(prediction[:n], rise, self.run)
                 if self.has_zero:
@@ -320,20 +329,19 @@ class RigRecordError(RecordError):
         return np.zeros(self.run.count)
 
     def with_recorder_error(self, prediction: Array, k: Array) -> Array:
-        """As of ``RecordError``; a clock moves by so little that two terms of Taylor's series are enough."""
+        """As of ``RecordError``."""
         if k[: self.places].any():
-            late_s, rate_hz = k[0] * self._from_middle_s, self.run.rate_hz
-            signals = prediction.reshape(-1, self.run.count)
-            rises = np.stack([derivative(one, rate_hz) for one in signals])
-            bends = np.stack([derivative(one, rate_hz) for one in rises])
-            prediction = (signals + late_s * rises + 0.5 * late_s**2 * bends).ravel()
+            late_s = -k[0] * self._from_middle_s
+            prediction = np.concatenate([_later(one, late_s, self.run.rate_hz)
+                                         for one in prediction.reshape(-1, self.run.count)])
         return super().with_recorder_error(prediction, k)
 
     @property
     def instruments(self) -> list[tuple[object, ...]]:
         """Of which instrument each of k is: runs of one instrument have one clock and gain. The zero of a part's force
         is each run's own."""
-        names = ["clock", "gain", "droop", *(one.name for one in self.run.signals)]
+        names = ["clock", "gain", "droop", *(f"{what} of {one.name}" for what in ("gain", "lag")
+                                             for one in self.run.signals)]
         facts = self.run.facts
         return [*((name, facts.step_mps2, facts.range_mps2) for name in names),
                 *[("zero", self.run.name)] * self.has_zero]
@@ -413,6 +421,12 @@ def _roughness(run: Run) -> Array:
 def _recorder_slopes(prediction: Array, rise: Array, run: Run) -> Array:
     """Derivatives (2, n) by the recorder's numbers of a prediction (n,) that changes at these rates (n,)."""
     return np.stack([prediction, derivative(rise, run.rate_hz) / (2 * np.pi * run.rate_hz) ** 2])
+
+
+def _later(samples: Array, late_s: float | Array, rate_hz: float) -> Array:
+    """Samples (n,) that come later by a small part of their waves: two terms of Taylor's series."""
+    rise = derivative(samples, rate_hz)
+    return np.asarray(samples - late_s * rise + 0.5 * late_s**2 * derivative(rise, rate_hz))
 
 
 def derivative(samples: Array, rate_hz: float) -> Array:

@@ -218,7 +218,7 @@ class Removed:
     drift_share, distance_share, filter_share    of the residual power of the model as it stands, at all frequencies
     distance_error_m                             the largest distance error, if it is unusual; else 0
     clock_ppm                                    how much faster the recorders of rigs run than the clock of what drives
-                                                 these: the largest, where they show it; else 0
+                                                 these: the largest; 0 where all else that is left may look like it
     error                                        normalised r.m.s. error of the fitted model without the drifts, and the
                                                  noise floor where the curves took some of the noise away
     """
@@ -260,7 +260,7 @@ def removed_from(posterior: Posterior, plain: Sequence[Array], state: State) -> 
         drifts, without_drift = tuple(one.nothing_found() for one in drifts), fitted
 
     clocks = [-1e6 * float(k[0]) for one, k in zip(posterior.record_errors, state.record, strict=True)
-              if one.run.timed and at_recorded_distances - fitted > LEAST_SHARE * fitted]
+              if one.run.timed and at_recorded_distances > 2 * fitted]
 
     def share(power: float) -> float:
         return float(min(max(power / whole, 0.0), 1.0)) if whole > 0 else 0.0

@@ -141,7 +141,8 @@ def test_where_the_car_was_is_the_same_for_all_signals(run: Run) -> None:
     slopes = error.slopes(state.predictions[0]).toarray()[curve].sum(axis=0).reshape(-1, run.count)
     for one, other in zip(slopes, expected, strict=True):
         assert np.corrcoef(one, other)[0, 1] > 0.98
-    gains = error.slopes(state.predictions[0]).toarray()[[error.places, -1]].reshape(2, -1, run.count)
+    last = error.places + 1 + len(SIGNALS)
+    gains = error.slopes(state.predictions[0]).toarray()[[error.places, last]].reshape(2, -1, run.count)
     assert not gains[0, 1:].any() and not gains[1, :-1].any()
     assert gains[1, -1] == pytest.approx(state.predictions[0][-run.count:])
 
@@ -159,6 +160,23 @@ def test_a_signal_whose_scale_is_off_moves_no_number(run: Run, share: float, nam
     assert np.abs(found.logs).max() < 0.01
     assert posterior.record_errors[0].signal_gains(found.record[0]) == pytest.approx([share], abs=0.005)
     assert signals_off(posterior.record_errors, found.record) == named
+
+
+@pytest.mark.parametrize("late_s", [0.0, 2e-3])
+def test_a_signal_that_is_read_a_little_later_moves_no_number(run: Run, late_s: float) -> None:
+    """Channels that are read in turn: a fifth of a sample would move a number by 2 %, if it had none."""
+    travel = SIGNALS[-1:]
+    fine = with_signals(run, travel)
+    (true,) = SimulatedRuns([fine], FINE_HZ).predict(compose(CAR))
+    noise = np.random.default_rng(5).normal(0, 1, (2, run.count)) * np.array([[0.02], [2e-5]])
+    body, moved = true.reshape(2, -1)
+    f_hz = np.fft.rfftfreq(run.count, 1 / run.rate_hz)
+    later = np.fft.irfft(np.fft.rfft(moved) * np.exp(-2j * np.pi * f_hz * late_s), run.count)
+    seen = replace(fine, measured_mps2=body + noise[0], more=later[None] + noise[1:])
+    posterior = Posterior(SimulatedRuns([seen], FINE_HZ), CAR, Tolerance())
+    found = fit_model(posterior, posterior.start()).state
+    assert np.abs(found.logs).max() < 0.01
+    assert found.record[0][-1] == pytest.approx(late_s, abs=1e-4)
 
 
 def test_a_counting_sensor_has_no_gain_to_speak_of() -> None:
