@@ -5,8 +5,10 @@ stops make more of it than of all other noise, and the fit follows it. There the
 themselves (H. White, Econometrica 50, 1982): of the gradient under the noise as it is, between two inverses of the
 information. The noise of the readings has the residual's power in each band; that of the input is drawn. What measured
 the input has a gain as well: lengths and velocities of effects are known no better than the motion. Clock and gains of
-the recorder, which a fit lets differ from run to run, are the same in all: more runs do not average them. Differences
-over steps do not show exactly that a larger car under larger forces moves the same; the derivatives are made to.
+the recorder, which a fit lets differ from run to run, are the same in all: more runs do not average them. What is
+missing is no noise: some stretches call for one value of a number, others for another, and by what they contradict each
+other the errors are larger (K.-Y. Liang and S. Zeger, Biometrika 73, 1986). Differences over steps do not show exactly
+that a larger car under larger forces moves the same; the derivatives are made to.
 
 The numbers of effects differ by many powers of ten (a cubic stiffness has 1e6, a ratio 1), so that the matrix is scaled
 to a diagonal of ones before it is inverted.
@@ -21,6 +23,7 @@ from logger.arrays import Array
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import own_slopes, range_of, with_dimensions
 from logger.lab.likelihood.posterior import Posterior, State
+from logger.lab.likelihood.whittle import BLOCK_S
 from logger.runs import are_on_rig
 from logger.simulation.virtual_drive import begins_unknown
 from logger.vehicle.effect import Chosen, Sought
@@ -111,7 +114,8 @@ def _covariance(linear: LinearModel) -> Array:
     scale = np.where(known, size, 1.0)
     inverse = np.linalg.pinv(information / np.outer(scale, scale), rcond=1e-10, hermitian=True) / np.outer(scale, scale)
     if on_rig:
-        inverse = inverse @ (information + _scatter(linear, slopes, gained)) @ inverse
+        scatter, pulls = _scatter(linear, slopes, gained)
+        inverse = inverse @ with_contradictions(information + scatter, pulls) @ inverse
     return np.asarray(np.where(np.outer(known, known), inverse, np.diag(np.where(known, 0.0, np.inf))))
 
 
@@ -127,28 +131,54 @@ def _frees_all_lengths(posterior: Posterior, state: State) -> bool:
             and not any(value and dimensions_of(name)[1] for name, value in fixed if np.isfinite(value)))
 
 
-def _scatter(linear: LinearModel, slopes: list[Array] | None, gained: Sequence[Array]) -> Array:
+def with_contradictions(covariance: Array, pulls: Array) -> Array:
+    """The covariance (m, m) of a gradient, larger where the gradients (stretches, m) of stretches contradict each other
+    by more than it and chance make: by more than the largest eigenvalue of as many draws of it (I. Johnstone, Annals of
+    Statistics 29, 2001)."""
+    size = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    scale = np.where(size > 0, size, 1.0)
+    values, ways = np.linalg.eigh(covariance / np.outer(scale, scale))
+    kept = values > 1e-10 * values[-1]
+    count, free = int(kept.sum()), len(pulls) - 1
+    if free < 2 or not count:
+        return covariance
+    root, inverse = (scale**way * (ways[:, kept].T * np.sqrt(values[kept])[:, None]**way) for way in (1, -1))
+    drawn = (pulls - pulls.mean(axis=0)) @ inverse.T
+    values, ways = np.linalg.eigh(drawn.T @ drawn * (len(pulls) / free))
+    sides = np.sqrt([free - 1, count])  # 2.02: the 99th percentile of C. Tracy and H. Widom's distribution
+    chance = sides.sum() * (sides.sum() + 2.02 * (1 / sides).sum() ** (1 / 3)) / free
+    more = root.T @ ways * np.sqrt(np.where(values > chance, values - 1, 0.0))
+    return np.asarray(covariance + more @ more.T)
+
+
+def _scatter(linear: LinearModel, slopes: list[Array] | None, gained: Sequence[Array]) -> tuple[Array, Array]:
     """Covariance of the gradient of a rig's fit by the numbers of the car, and by those whose derivatives (m, n) per
-    run these are, less the information: (p + m, p + m). ``gained`` is what the input's gain carries (n,) per run."""
+    run these are, less the information: (p + m, p + m); and the gradients of stretches (stretches, p + m). ``gained``
+    is what the input's gain carries (n,) per run."""
     posterior, state = linear.posterior, linear.state
     parts = [one for one in (linear.numbers, slopes) if one is not None]
     columns = linear.without_record_errors([np.vstack(one) for one in zip(*parts, strict=True)])
     # The standard error of a standard deviation by so many draws is 1 / sqrt(2 n) of it, a sixth.
     drawn = [posterior.carried_noise(state, draw) for draw in range(18)]
     found = np.zeros((len(columns[0]), len(columns[0])))
-    pulls, gain_pull = np.zeros((len(drawn), len(found))), np.zeros(len(found))
+    pulls, gain_pull, stretches = np.zeros((len(drawn), len(found))), np.zeros(len(found)), []
     for run, (bands, residual) in enumerate(zip(posterior.bands, posterior.residuals(state), strict=True)):
         carried = np.mean([bands.power(one[run]) for one in drawn], axis=0)
         own, white = bands.scatter_whitener(residual, carried)(columns[run]), linear.whiteners[run](columns[run])
         pulls += np.stack([linear.whiteners[run](one[run]) for one in drawn]) @ white.T
         gain_pull += white @ linear.whiteners[run](gained[run])
         found += own @ own.T - white @ white.T
+        each = linear.whiteners[run].in_time(columns[run]) * linear.whiteners[run].in_time(residual)
+        by_time = each.reshape(len(found), len(bands.each), -1).sum(axis=1)
+        # Longer than a rig remembers what moved it, some seconds.
+        count = max(1, round(by_time.shape[1] / (2 * BLOCK_S * posterior.runs.runs[run].rate_hz)))
+        stretches += [one.sum(axis=1) for one in np.array_split(by_time, count, axis=1)]
     for pull in (by_run := linear.pulls_of_instruments(columns)):
         found -= sum(np.outer(one, one) for one in pull.values())
     for instrument in {one: None for pull in by_run for one in pull}:
         both = sum(pull[instrument] for pull in by_run if instrument in pull)
         found += np.outer(both, both)
-    return found + pulls.T @ pulls / len(drawn) + np.outer(gain_pull, gain_pull)
+    return found + pulls.T @ pulls / len(drawn) + np.outer(gain_pull, gain_pull), np.array(stretches)
 
 
 def with_standard_errors(effects: Sequence[Chosen], free_parameters: Sequence[FreeParameter], deviations: Array

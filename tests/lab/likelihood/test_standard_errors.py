@@ -15,7 +15,12 @@ from logger.arrays import Complex
 from logger.lab.likelihood.distance_error import USUAL, ErrorSize
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit
-from logger.lab.likelihood.standard_errors import deviations_from_null, standard_errors, with_standard_errors
+from logger.lab.likelihood.standard_errors import (
+    deviations_from_null,
+    standard_errors,
+    with_contradictions,
+    with_standard_errors,
+)
 from logger.vehicle.effect import Chosen, Parameter, Scale, SensorEffect, chosen
 from logger.vehicle.named_parameters import free_parameters_of
 from logger.vehicle.uncertain import grows_with_mass
@@ -86,6 +91,23 @@ def test_twice_the_noise_makes_an_effect_half_as_certain() -> None:
     there = fit(align(loud, loud.start([tire_damping(200.0)])))
     quiet, noisy = (standard_errors(one).effects[0].standard_errors[NAME] for one in (found(), there))
     assert 1.5 < noisy / quiet < 4.5  # of four times the noise: the priors of the car's numbers hold part of it
+
+
+@pytest.mark.parametrize(("numbers", "stretches"), [(3, 14), (9, 40), (4, 8)])
+def test_stretches_contradict_each_other_where_they_do_so_more_than_by_chance(numbers: int, stretches: int) -> None:
+    """Of gradients that noise makes one covariance in a hundred is larger, whatever the units; of three times as large
+    ones all."""
+    rng = np.random.default_rng(1)
+    root = rng.normal(size=(numbers, numbers)) * np.logspace(0, 5, numbers)[:, None]
+    noise = root @ root.T
+    larger = []
+    for _ in range(300):
+        pulls = rng.normal(size=(stretches, numbers)) @ root.T / np.sqrt(stretches)
+        larger.append([np.sqrt(np.linalg.det(with_contradictions(noise, size * pulls)) / np.linalg.det(noise))
+                       for size in (1.0, 3.0)])
+    chance, contradicted = np.array(larger).T
+    assert (chance > 1 + 1e-6).mean() < 0.03 and (contradicted > 2).mean() > 0.99
+    assert with_contradictions(noise, pulls[:2]) is noise  # two say nothing
 
 
 def test_errors_are_the_roots_of_the_inverse_information_whatever_the_units() -> None:
