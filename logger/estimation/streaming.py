@@ -132,7 +132,7 @@ class RoadEstimator:
     driven_share     way that was driven over what the distance says; windows are of that distance
     reads            readings of each sample; more than one only where the sensor is coarse
     noise_log_std    of a noise that is not learned: standard error of its logarithm
-    lag_s            a stretch is taken once the car is so far past it
+    lag_s            a stretch is taken once the car is so far past it, in whole hops
 
     ``road`` knows what was learned on the way.
     """
@@ -145,7 +145,7 @@ class RoadEstimator:
                  noise_log_std: float = 0.0, lag_s: float = LAG_S) -> None:
         if reads > 1 and not sensor.is_coarse:
             raise ValueError("expected one reading per sample, as the noise blurs the steps")
-        self._reads, self._lag = reads, round(lag_s * RATE_HZ)
+        self._reads, self._lag = reads, HOP_SAMPLES * round(lag_s * RATE_HZ / HOP_SAMPLES)
         self._car, self._off, self._is_measured = car, tuple(off), is_measured
         self._driven_share = driven_share
         window_m, ride_ahead_m = window_m * driven_share, ride_ahead_m * driven_share
