@@ -5,9 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from logger.api.lab.bench import bench_with
 from logger.api.lab.question import CompareQuestion
+from logger.lab.diagnosis import begin_search
 from logger.lab.laws.draft import LawContext
 from logger.lab.laws.families.damper_as_a_whole import FAMILY
 from logger.vehicle.compose import compose
@@ -27,7 +29,8 @@ def test_it_is_the_force_of_its_equations(tmp_path: Path) -> None:
     posterior = bench.posterior()
     context = LawContext(posterior, posterior.start([]))
     draft = FAMILY.drafts(context)[0]
-    valves = dict(zip(draft.strengths, (-300.0, -250.0, -160.0, -80.0, -30.0, 10.0, 20.0, 30.0, 20.0), strict=False))
+    valves_n = -300.0, -250.0, -160.0, -80.0, -40.0, -20.0, 5.0, 10.0, 20.0, 30.0, 20.0
+    valves = dict(zip(draft.strengths, valves_n, strict=False))
     at_m = {one.name: float(one.meaning.split()[5]) / 1000 for one in draft.parameters if one.name.startswith("more_")}
     law = chosen(draft.effect, draft.effect.usual | valves | {name: MORE_PER_M * at for name, at in at_m.items()} | {
         "oil_n_per_m": OIL, "play_m": PLAY_M, "seals_n": SEALS_N, "seals_travel_m": OVER_M,
@@ -55,3 +58,31 @@ def test_it_is_the_force_of_its_equations(tmp_path: Path) -> None:
     found_n, linear_n = (bench.runs.predict(compose(bench.model.vehicle, some))[0] for some in ([law], []))
     kept = slice(200, -50)
     assert np.std((found_n - true_n)[kept]) < 0.02 * np.std((linear_n - true_n)[kept])
+
+
+@pytest.mark.slow
+def test_what_rubs_in_it_may_yield_over_much_of_the_travel(tmp_path: Path) -> None:
+    """A wire rope that gives over 1.5 mm, and pulls harder than it pushes: J. Ni and others, J. Eng. Mech. 125 (1999)
+    1294, equations 3 to 5. Begun at a hundredth of that alone, its friction is not found, and the error is .31."""
+    def rates(_t: float, _x: float, v: float, state: list[float]) -> list[float]:
+        z = state[0]
+        return [4.5e4 * v - (150.0 * abs(v) * abs(z) ** 0.1 * z + 300.0 * v * abs(z) ** 1.1)]
+
+    def force(x: Array, v: Array, z: Array) -> Array:
+        return 1.6 ** (60.0 * x) * (2e4 * x - 6e5 * x * np.abs(x) + 5e8 * x**3 + z[0]) + 20.0 * v
+
+    vehicle, posteriors = tmp_path / "part.yaml", []
+    vehicle.write_text("name: part\nmodel: component\nstiffness_n_per_m: 0 +- 40000\ndamping_n_s_per_m: 1500 +- 100%\n"
+                       "preload_n: unknown\n", "utf-8")
+    for seed in (1, 2):
+        place_m = moved(seed, 10.0, 0.005 / seed**0.5, 10.0)
+        force_n = force_of(rates, force, 1, place_m) + np.random.default_rng(seed).normal(0, 0.5, len(place_m))
+        run = write_bench(tmp_path / f"run{seed}", place_m, force_n)
+        posteriors.append(bench_with(CompareQuestion(vehicle, run)).posterior(searches=seed == 1))
+    seen, kept = posteriors
+    search, before = begin_search(seen, {}, (), lambda words: None)
+    found = search.best_of(FAMILY.drafts(LawContext(seen, before.state))[0].effect, before, {}).state
+    run = kept.runs.runs[0]
+    left = (run.main(kept.state_at(found.effects, found.logs).predictions[0]) - run.measured_mps2)[run.first:]
+    error = float(np.std(left) / np.std(run.measured_mps2[run.first:]))
+    assert error < 0.1  # measured: .062

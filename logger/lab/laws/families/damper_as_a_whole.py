@@ -11,8 +11,9 @@ import numpy as np
 from logger.lab.laws.draft import Draft, Family, FormatNumber, LawContext, rounded, through_points
 from logger.vehicle.effect import Chosen, Parameter, Scale
 
-_SHARES = (0.03, 0.1, 0.3, 0.6, 1.0)
-"""Of the highest rate, where the curve has its points: valves open, and fluids yield, at low rates."""
+_SHARES = (1 / 32, 1 / 16, 1 / 8, 1 / 4, 1 / 2, 1.0)
+"""Of the highest rate, where the curve has its points, each at twice the rate of the one before: a knee may be at any,
+as valves open, and fluids yield, at low ones."""
 _PLACES = 9
 """Of the travel, from one end of it to the other."""
 _METHOD = """
@@ -82,10 +83,10 @@ class DamperAsAWhole(Family):
              Parameter("oil_n_per_m", springs[0], springs[-1] / 100, rigid, None, Scale.LOG, springs,
                        "in series with the valves", default=rigid, may_end=True),
              force("seals_n", 0.2, "with which the seals slide"),
-             Parameter("seals_travel_m", way_m, way_m / 1000, 100 * way_m, None, Scale.LOG, (way_m,),
+             Parameter("seals_travel_m", way_m, way_m / 1000, 100 * way_m, None, Scale.LOG, (way_m, 10 * way_m),
                        "over which their first stiffness would reach that force", may_end=True),
              Parameter("seals_sharpness_ratio", 1.0, 0.2, 10.0, None, Scale.LOG, (1.0,), "of the yield", may_end=True),
-             Parameter("play_m", 0.1 * way_m, 0.0, travel_m, None, Scale.LINEAR, (0.1 * way_m, way_m),
+             Parameter("play_m", 0.1 * way_m, 0.0, travel_m, None, Scale.LINEAR, (0.1 * way_m,),
                        "in series with the valves, either way", step=0.02 * way_m, may_end=True),
              *(Parameter(name, 0.05, -1.0, 100.0, 0.0, Scale.LINEAR, (0.05,),
                          f"of the valves' force at {1000 * at:g} mm over that at rest, less 1", step=0.02)
