@@ -50,8 +50,8 @@ def noise(highest_hz: float, size: float, seed: int) -> Course:
 class Bench:
     """A mass on a base [kg, N/m, N s/m], or two of them, on each other and on a tire; further forces by its travel, and
     of the guide that it goes along, which stands on the ground: friction, grown over 1 mm/s and so many times as large
-    at rest, of which excess 1 / e is left at 30 mm/s, and drag; what an orifice adds to the damper, by the square of
-    its rate; and play of the spring, this way in each direction."""
+    at rest, of which excess 1 / e is left at 30 mm/s, drag, and a spring to it; what an orifice adds to the damper, by
+    the square of its rate; and play of the spring, this way in each direction."""
 
     mass: float = 0.3
     spring: float = 30.0
@@ -62,6 +62,7 @@ class Bench:
     guide_n: float = 0.0
     holds: float = 1.0
     guide_drag: float = 0.0
+    guide_spring: float = 0.0
     orifice: float = 0.0
     play_m: float = 0.0
 
@@ -88,7 +89,7 @@ class Bench:
                 felt_m = np.sign(travel_m) * np.maximum(np.abs(travel_m) - self.play_m, 0.0)
             force = self.spring * felt_m + self.damper * rate_mps + self.cubic * travel_m**3
             force = force + self.orifice * rate_mps * abs(rate_mps)
-            guide = self.guide_drag * body_mps
+            guide = self.guide_drag * body_mps + self.guide_spring * body_m
             if self.guide_n:
                 more = 1.0 + (self.holds - 1.0) * np.exp(-(body_mps / 0.03)**2)
                 guide = guide + self.guide_n * np.tanh(body_mps / 0.001) * more
@@ -210,18 +211,21 @@ def test_a_spring_with_play_in_its_seat_is_what_the_integrator_says(
 
 FRICTION = "{name: frame_friction, friction_force_n: 0.8, transition_velocity_m_per_s: 0.001}"
 DRAG = "{name: frame_damping, body_damping_n_s_per_m: 3}"
+HELD = "{name: frame_spring, body_stiffness_n_per_m: 500}"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("hidden", [
-    {"guide_n": 0.8}, {"guide_drag": 3.0}, {"guide_n": 0.8, "guide_drag": 3.0}])
+    {"guide_n": 0.8}, {"guide_drag": 3.0}, {"guide_n": 0.8, "guide_drag": 3.0}, {"guide_spring": 500.0},
+    {"guide_spring": 500.0, "wheel": 0.3, "tire": 4000.0}])
 def test_a_mass_that_goes_along_a_guide_on_the_ground_is_what_the_integrator_says(
         hidden: dict[str, float], tmp_path: Path) -> None:
     bench, base, push = Bench(1.2, 900.0, 4.0, **hidden), noise(12.0, 0.001, 5), noise(12.0, 0.5, 6)
     seen = bench.moved(base, push, NOTHING)
     run = written(tmp_path / "run", {"velocity_mps": seen["velocity_mps"]},
                   {"elevation_m": base(TIME_S), "force_n": push(TIME_S)}, BODY)
-    effects = [FRICTION] * ("guide_n" in hidden) + [DRAG] * ("guide_drag" in hidden)
+    effects = [one for one, there in ((FRICTION, "guide_n"), (DRAG, "guide_drag"), (HELD, "guide_spring"))
+               if there in hidden]
     (tmp_path / "bench.yaml").write_text(f"{bench.yaml}effects: [{', '.join(effects)}]\n")
     assert ridelog.compare(tmp_path / "bench.yaml", [run]).error < 0.01
     (tmp_path / "bench.yaml").write_text(bench.yaml)
@@ -232,6 +236,7 @@ def test_a_mass_that_goes_along_a_guide_on_the_ground_is_what_the_integrator_say
 @pytest.mark.parametrize(("hidden", "name", "number", "moves"), [
     ({"guide_n": 0.8}, "frame_friction", "friction_force_n", True),
     ({"guide_drag": 12.0}, "frame_damping", "body_damping_n_s_per_m", True),
+    ({"guide_spring": 400.0}, "frame_spring", "body_stiffness_n_per_m", True),
     ({"guide_n": 0.8}, "dry_friction", "friction_force_n", False),  # of a base at rest nobody can tell its guide
 ])
 def test_what_acts_on_a_single_mass_from_its_guide_is_named(

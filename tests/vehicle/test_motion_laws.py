@@ -538,8 +538,8 @@ def test_which_a_search_tries_unasked() -> None:
     model = CarModel(RIG, ())
     assert {"hysteresis", "frame_friction"}.isdisjoint(known_effects(model, [])[0])
     assert known_effects(model, [], on_rig=True)[0].keys() - known_effects(model, [])[0] == {
-        "constant_force", "force_gain", "force_limit", "frame_damping", "frame_friction", "orifice_damping", "play",
-        "maxwell_element"}
+        "constant_force", "force_gain", "force_limit", "frame_damping", "frame_friction", "frame_spring",
+        "orifice_damping", "play", "maxwell_element"}
     assert known_effects(model, ["hysteresis"])[0].keys() - known_effects(model, [])[0] == {"hysteresis"}
     assert sought_effects(True, of_part=True).keys() - sought_effects(True) == {"hysteresis"}
     with pytest.raises(BadInput, match="each effect once, found dry_friction again"):

@@ -108,18 +108,20 @@ class Bench:
             return compare(self.runs, self.model.vehicle, self.model.effects, self.model.given, self.tolerance)
 
     def diagnosed(self, notify: Notify = silent, left_out: frozenset[str] = frozenset()) -> LabDiagnosis:
-        """Which effects the model lacks, without some that are left out. Where the runs contradict what is known of the
-        car's numbers and nothing explains that, nothing is taken to be known of them. BadInput as ``compared``."""
+        """Which effects the model lacks, without some that are left out. Where the runs of a rig contradict what is
+        known of its numbers and nothing explains that, or a signal's gain had to make up for it, nothing is taken to
+        be known of them. BadInput as ``compared``."""
         effects = {name: effect for name, effect in self.effects.items() if name not in left_out}
         last = {name: effect for name, effect in self.last.items() if name not in left_out}
         with self.blamed():
             found = diagnose(self.posterior(searches=True), effects, self.model.effects, notify, last)
-            if found.verdict or not (found.beyond and found.exceeds_noise) or not self.timed:
+            unexplained = found.signals_off or (found.exceeds_noise and not found.verdict)
+            if not (self.timed and found.beyond and unexplained):
                 return found
             notify("the runs contradict the vehicle's file: searching with its parameters unknown")
             wide = replace(self, tolerance=self.tolerance.widened())
             again = diagnose(wide.posterior(searches=True), effects, self.model.effects, notify)
-        return replace(again, contradicted=tuple(found.beyond)) if again.verdict else found
+        return replace(again, contradicted=tuple(found.beyond)) if again.verdict and not again.signals_off else found
 
     def named(self, name: str) -> tuple[Effect, str | None]:
         """An effect by its name or that of its file, and the file. BadInput where it is not known."""

@@ -22,6 +22,7 @@ import numpy as np
 from logger.arrays import Array
 from logger.identification.time_scale import ringing_hz
 from logger.lab.likelihood.by_squares import ROUNDS, BySquares
+from logger.lab.likelihood.distance_error import signals_off
 from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit, fit_model
 from logger.lab.likelihood.noise_floor import floor_error, sensor_noise_of
@@ -125,9 +126,11 @@ class UnknownNumbers(MeasuredRoad):
         others are tried with these. In the place of an effect they begin with what the model with it has shown, and
         that effect itself is left out where it ends there again."""
         local = super().screened(base, effects, seen, near, pool, progress)
-        # Were numbers far off, the car's resonances would be, and leave more than so little of what was measured.
+        # Were numbers far off, the car's resonances would be, and leave more than so little of what was measured, or a
+        # signal's gain would be, which had to make up for it.
         if ((base.explanation == 0 or base.hold_out.error < UNEXPLAINED)
-                and not base.posterior.prior.is_contradicted_by(base.state.logs)):
+                and not base.posterior.prior.is_contradicted_by(base.state.logs)
+                and not signals_off(base.posterior.record_errors, base.state.record)):
             return local
         by_squares = self._by_squares(base.posterior)
         anchor = self._anchor(by_squares, base.state, 1)
