@@ -255,6 +255,20 @@ def test_a_recorder_with_a_clock_of_its_own_hides_nothing(bench: Path, tmp_path:
     assert found["errors"][-2]["error"] < 1.1 * found["noise_floor_error"]
 
 
+@pytest.mark.slow
+def test_a_recorder_that_is_late_by_half_a_sample_moves_no_number(bench: Path, tmp_path: Path,
+                                                                  capsys: pytest.CaptureFixture[str]) -> None:
+    """All its channels, by 2 ms of 4; nothing else is missing."""
+    run, late_s = with_signals(tmp_path / "run", Rig(), 12.0, 1), 0.002
+    rows = np.loadtxt(run / "drive.csv", delimiter=",", skiprows=1)
+    late = CubicSpline(rows[:, 0], rows[:, 1:])(np.maximum(rows[:, 0] - late_s, 0.0))
+    np.savetxt(run / "drive.csv", np.column_stack([rows[:, 0], late]), "%.12g", ",", comments="",
+               header="t_s,accel_z_mps2,wheel_accel_mps2,front_travel_m")
+    found = reported(capsys, "diagnose", "--vehicle", bench / "rig.yaml", run)
+    assert found["verdict"] == [] and found["unexplained"] is False
+    assert found["removed"]["distance"]["lag_s"] == pytest.approx(late_s, abs=1e-4)
+
+
 def test_signals_come_back_from_python(tmp_path: Path) -> None:
     run = ridelog.read_run(with_signals(tmp_path / "run", Rig(), 6.0, 1))
     assert list(run.more) == ["wheel_accel_mps2", "front_travel_m"]

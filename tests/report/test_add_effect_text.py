@@ -18,7 +18,7 @@ from logger.vehicle.uncertain import NumberErrors
 from ..support.lab.runs_with_residual import CAR
 
 EFFECTS = shipped_effects()
-AS_USUAL = Removed((), 0.0, 0.0, 0.0, 0.0, 0.0, 0.153)
+AS_USUAL = Removed((), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.153)
 MASS = ShiftedNumber("sprung_mass_kg", nominal=875.0, without=846.0, without_standard_error=9.8, found=876.0,
                      standard_error=7.5)
 TIRE = ShiftedNumber("rear.tire_stiffness_n_per_m", nominal=238180.0, without=300000.0, without_standard_error=3000.0,

@@ -33,7 +33,7 @@ def candidate(name: str, p_value: float, gain: float, **values: float) -> Candid
 
 
 OTHERS = (candidate("tire_damping", 0.3, 8.0), candidate("sensor_gain", 1.0, -2.0))
-AS_USUAL = Removed((), 0.0, 0.0, 0.0, 0.0, 0.0, 0.151)
+AS_USUAL = Removed((), 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.151)
 NOTHING = LabDiagnosis(
     runs=("runs/a",), catalogue=EFFECTS, baseline_error=0.31, final_error=0.151, noise=NoiseLevel(0.05, 0.001),
     noise_floor_error=0.15, candidates=OTHERS, obstacles={}, verdict=(), excess=0.02, beyond={}, in_conflict=False,
@@ -135,6 +135,15 @@ def test_what_was_removed_comes_first_where_it_is_most_of_the_residual() -> None
             AS_USUAL, distance_share=share, clock_ppm=80.0)))]
 
     assert said(0.6) == ["The", "Nothing", "NRMSE"] and said(0.01) == ["Nothing", "NRMSE", "The"]
+
+
+@pytest.mark.parametrize(("clock_ppm", "lag_s", "words"), [
+    (-80.0, 0.0, "runs 80 ppm slower than that"), (0.2, 0.00096, "is 0.96 ms behind that"),
+    (4.0, -0.002, "runs 4 ppm faster than and is 2 ms ahead of that")])
+def test_how_a_recorders_clock_is_off_is_said(clock_ppm: float, lag_s: float, words: str) -> None:
+    said = " ".join(diagnosis_summary(replace(NOTHING, removed=replace(
+        AS_USUAL, distance_share=0.6, clock_ppm=clock_ppm, lag_s=lag_s))))
+    assert f"The recorder's clock {words} of the excitation." in said
 
 
 def test_what_is_left_is_the_share_that_is_not_explained_on_stretches_that_no_fit_saw() -> None:

@@ -100,10 +100,16 @@ def removed_by_share(found: Removed) -> list[RemovedCause]:
         size = f"up to {found.distance_error_m:.2g} m"
         causes.append(RemovedCause(distance, "wrong distances", size, (
             f"The distances of these runs are off by {size}, more than usual. {corrected}")))
-    if found.clock_ppm:
-        causes.append(RemovedCause(distance, "another clock", f"{found.clock_ppm:+.0f} ppm", (
-            f"The recorder's clock runs {abs(found.clock_ppm):.0f} ppm "
-            f"{'faster' if found.clock_ppm > 0 else 'slower'} than that of the excitation. {corrected}")))
+    late_ms, clock = 1e3 * found.lag_s, []
+    if round(found.clock_ppm):
+        clock.append((f"{found.clock_ppm:+.0f} ppm", f"runs {abs(found.clock_ppm):.0f} ppm "
+                      f"{'faster' if found.clock_ppm > 0 else 'slower'} than"))
+    if round(1e3 * late_ms):
+        clock.append((f"{late_ms:+.2g} ms", f"is {abs(late_ms):.2g} ms {'behind' if late_ms > 0 else 'ahead of'}"))
+    if clock:
+        sizes, words = zip(*clock, strict=True)
+        causes.append(RemovedCause(distance, "another clock", ", ".join(sizes), (
+            f"The recorder's clock {' and '.join(words)} that of the excitation. {corrected}")))
     if found.drifting_sensors:
         size = drift_words(found)
         causes.append(RemovedCause(found.drift_share, "sensor drift", size, (
@@ -133,7 +139,7 @@ def removed_json(found: Removed) -> dict[str, Any]:
                 {"run": one.run, "form": one.form, "size_mps2": one.size_mps2, "time_s": one.time_s}
                 for one in found.drifts]},
             "distance": {"error_power_share": found.distance_share, "off_m": found.distance_error_m,
-                         "clock_ppm": found.clock_ppm},
+                         "clock_ppm": found.clock_ppm, "lag_s": found.lag_s},
             "filter": {"error_power_share": found.filter_share},
         },
         "error_without_drift": found.error,

@@ -135,8 +135,12 @@ class RecordError:
         gain, *gains = (self.tolerance.gain_of(one) for one in signals)
         gain = gain if gain >= self.scale_std else _HELD * gain
         zero = [float(np.sqrt(np.mean(self.run.kept_readings_mps2**2))) or 1.0] if self.has_zero else []
-        lags_s = [1 / (self.run.rate_hz * np.sqrt(12))] * len(gains)
-        return np.array([gain, self.tolerance.droop, *gains, *lags_s, *zero])
+        return np.array([gain, self.tolerance.droop, *gains, *[self._lag_deviation_s] * len(gains), *zero])
+
+    @property
+    def _lag_deviation_s(self) -> float:
+        """Of channels that are read in turn, each anywhere within half a sample: uniform."""
+        return float(1 / (self.run.rate_hz * np.sqrt(12)))
 
     @property
     def has_zero(self) -> bool:
@@ -281,10 +285,10 @@ class RecordError:
 
 
 class RigRecordError(RecordError):
-    """Errors of the record of a run on a rig: numbers k of its clock, its recorder and signals. What moves a rig and
-    what the rig does may be recorded by two clocks, one of which runs a little faster: the record lies right in its
-    middle. There is no distance error: one that was fitted nevertheless would absorb physics. Methods as of
-    ``RecordError``."""
+    """Errors of the record of a run on a rig: numbers k of its clock and lag, its recorder and signals. What moves a
+    rig and what the rig does may be recorded by two clocks, one of which runs a little faster, and lie up to half a
+    sample apart in the middle. There is no distance error: one that was fitted nevertheless would absorb physics.
+    Methods as of ``RecordError``."""
 
     @staticmethod
     def of(run: Run, tolerance: Tolerance, scale_std: float = 0.0) -> RigRecordError:
@@ -292,7 +296,8 @@ class RigRecordError(RecordError):
         from scipy.sparse import csr_array
 
         from_middle_s = (np.arange(run.count) - 0.5 * (run.count - 1)) / run.rate_hz
-        return RigRecordError(run, csr_array(from_middle_s[None]), tolerance, 1.0, None, scale_std)
+        return RigRecordError(run, csr_array(np.stack([from_middle_s, np.ones(run.count)])), tolerance, 1.0, None,
+                              scale_std)
 
     @property
     def spline_count(self) -> int:
@@ -304,9 +309,11 @@ class RigRecordError(RecordError):
 
     @property
     def deviations(self) -> Array:
-        """Standard deviations of k. What nothing drives has no second clock."""
+        """Standard deviations of k. What nothing drives has no second clock. Of a signal alone an effect does what the
+        lag does, which is held."""
         clock = _HELD if self.run.past is Past.FREE else 1.0
-        return np.array([*[clock * self.tolerance.clock] * self.places, *self._recorder_deviations])
+        lag = clock if self.run.signals else _HELD
+        return np.array([clock * self.tolerance.clock, lag * self._lag_deviation_s, *self._recorder_deviations])
 
     @property
     def _pace(self) -> Array:
@@ -321,17 +328,13 @@ class RigRecordError(RecordError):
     def log_determinant(self, size: ErrorSize) -> float:
         return -2 * float(np.log(self.deviations).sum())
 
-    @cached_property
-    def _from_middle_s(self) -> Array:
-        return np.asarray(self.basis.toarray()[0])
-
     def distance_error_m(self, k: Array) -> Array:
         return np.zeros(self.run.count)
 
     def with_recorder_error(self, prediction: Array, k: Array) -> Array:
         """As of ``RecordError``."""
         if k[: self.places].any():
-            late_s = -k[0] * self._from_middle_s
+            late_s = -(self.basis.T @ k[: self.places])
             prediction = np.concatenate([_later(one, late_s, self.run.rate_hz)
                                          for one in prediction.reshape(-1, self.run.count)])
         return super().with_recorder_error(prediction, k)
@@ -340,7 +343,7 @@ class RigRecordError(RecordError):
     def instruments(self) -> list[tuple[object, ...]]:
         """Of which instrument each of k is: runs of one instrument have one clock and gain. The zero of a part's force
         is each run's own."""
-        names = ["clock", "gain", "droop", *(f"{what} of {one.name}" for what in ("gain", "lag")
+        names = ["clock", "lag", "gain", "droop", *(f"{what} of {one.name}" for what in ("gain", "lag")
                                              for one in self.run.signals)]
         facts = self.run.facts
         return [*((name, facts.step_mps2, facts.range_mps2) for name in names),

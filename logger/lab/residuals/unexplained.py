@@ -217,8 +217,9 @@ class Removed:
     drifts                                       of the runs' sensors, one each
     drift_share, distance_share, filter_share    of the residual power of the model as it stands, at all frequencies
     distance_error_m                             the largest distance error, if it is unusual; else 0
-    clock_ppm                                    how much faster the recorders of rigs run than the clock of what drives
-                                                 these: the largest; 0 where all else that is left may look like it
+    clock_ppm, lag_s                             how much faster the recorders of rigs run than the clock of what drives
+                                                 these, and how late they are in the middle of a record: the largest; 0
+                                                 where all else that is left may look like it
     error                                        normalised r.m.s. error of the fitted model without the drifts, and the
                                                  noise floor where the curves took some of the noise away
     """
@@ -229,6 +230,7 @@ class Removed:
     filter_share: float
     distance_error_m: float
     clock_ppm: float
+    lag_s: float
     error: float
 
     @cached_property
@@ -259,8 +261,9 @@ def removed_from(posterior: Posterior, plain: Sequence[Array], state: State) -> 
     if not fitted - without_drift > LEAST_SHARE * fitted:
         drifts, without_drift = tuple(one.nothing_found() for one in drifts), fitted
 
-    clocks = [-1e6 * float(k[0]) for one, k in zip(posterior.record_errors, state.record, strict=True)
+    clocks = [-k[:2] for one, k in zip(posterior.record_errors, state.record, strict=True)
               if one.run.timed and at_recorded_distances > 2 * fitted]
+    faster, late_s = (float(max(some, key=abs, default=0.0)) for some in np.reshape(clocks, (-1, 2)).T)
 
     def share(power: float) -> float:
         return float(min(max(power / whole, 0.0), 1.0)) if whole > 0 else 0.0
@@ -268,7 +271,7 @@ def removed_from(posterior: Posterior, plain: Sequence[Array], state: State) -> 
     measured = sum(float(run.kept_readings_mps2 @ run.kept_readings_mps2) for run in runs)
     floor = floor_error(posterior, sensor_noise_with_rounding(posterior, state))
     return Removed(drifts, share(fitted - without_drift), share(at_recorded_distances - fitted), share(outside),
-                   unusual_distance_error_m(posterior.record_errors, state.record), max(clocks, key=abs, default=0.0),
+                   unusual_distance_error_m(posterior.record_errors, state.record), 1e6 * faster, late_s,
                    min(max(float(np.sqrt(without_drift / measured)), floor), float(np.sqrt(fitted / measured)))
                    if measured > 0 else float("nan"))
 
