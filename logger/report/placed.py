@@ -9,6 +9,7 @@ import numpy as np
 from logger.arrays import Indices
 from logger.chart_data import Array
 from logger.left_out import LeftOut, counting
+from logger.question import WINDOW
 from logger.records import WindowRecord
 from logger.report.summary import counts
 from logger.roads.repeated_drives import means, passes_of, place_key, scatter_of
@@ -21,9 +22,9 @@ _NOT_PLACED = frozenset(("gps_lost", "gps_late"))
 
 
 def placed(one: WindowRecord) -> bool:
-    """Whether a row has a place that the receiver gave, and a length."""
+    """Whether a row has a place that the receiver gave, and a length that a window may have."""
     return (one.lat_deg is not None and one.lon_deg is not None and one.distance_start_m is not None
-            and one.distance_end_m is not None and one.distance_end_m > one.distance_start_m
+            and one.distance_end_m is not None and 0 < one.distance_end_m - one.distance_start_m <= WINDOW.high
             and _NOT_PLACED.isdisjoint(one.flags))
 
 

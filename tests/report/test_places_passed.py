@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from logger.report.page import track_views
-from logger.report.placed import places_passed
+from logger.report.placed import placed, places_passed
 from logger.report.summary import date_words, summarise
 
 from ..support.drives.logged_rows import repeated_drives
@@ -42,6 +42,14 @@ def test_rows_without_an_iri_and_empty_drives_are_borne() -> None:
     assert found is not None
     assert np.isnan(found.place).all()
     assert not len(found.iri_m_per_km)
+
+
+@pytest.mark.parametrize(("length_m", "can_be"), [(7.62, True), (1000.0, True), (1e9, False), (0.0, False)])
+def test_a_row_that_is_longer_than_any_window_has_no_place(length_m: float, can_be: bool) -> None:
+    """One of 1e9 m, damaged, took 23 GB of memory, as it was cut into places of 25 ft."""
+    row = repeated_drives(1, 1, (2.0,))[0]
+    object.__setattr__(row, "distance_end_m", row.distance_start_m + length_m)
+    assert placed(row) is can_be
 
 
 def test_a_page_of_too_many_windows_says_that_drives_lie_over_each_other(monkeypatch: pytest.MonkeyPatch) -> None:
