@@ -287,8 +287,8 @@ class RecordError:
 class RigRecordError(RecordError):
     """Errors of the record of a run on a rig: numbers k of its clock and lag, its recorder and signals. What moves a
     rig and what the rig does may be recorded by two clocks, one of which runs a little faster, and lie up to half a
-    sample apart in the middle. There is no distance error: one that was fitted nevertheless would absorb physics.
-    Methods as of ``RecordError``."""
+    sample apart in the middle; of a signal alone an effect does what the lag does, which is not there. There is no
+    distance error: one that was fitted nevertheless would absorb physics. Methods as of ``RecordError``."""
 
     @staticmethod
     def of(run: Run, tolerance: Tolerance, scale_std: float = 0.0) -> RigRecordError:
@@ -296,8 +296,8 @@ class RigRecordError(RecordError):
         from scipy.sparse import csr_array
 
         from_middle_s = (np.arange(run.count) - 0.5 * (run.count - 1)) / run.rate_hz
-        return RigRecordError(run, csr_array(np.stack([from_middle_s, np.ones(run.count)])), tolerance, 1.0, None,
-                              scale_std)
+        late = [np.ones(run.count)] * bool(run.signals)
+        return RigRecordError(run, csr_array(np.stack([from_middle_s, *late])), tolerance, 1.0, None, scale_std)
 
     @property
     def spline_count(self) -> int:
@@ -309,11 +309,9 @@ class RigRecordError(RecordError):
 
     @property
     def deviations(self) -> Array:
-        """Standard deviations of k. What nothing drives has no second clock. Of a signal alone an effect does what the
-        lag does, which is held."""
-        clock = _HELD if self.run.past is Past.FREE else 1.0
-        lag = clock if self.run.signals else _HELD
-        return np.array([clock * self.tolerance.clock, lag * self._lag_deviation_s, *self._recorder_deviations])
+        """Standard deviations of k. What nothing drives has no second clock."""
+        clock = np.array([self.tolerance.clock, self._lag_deviation_s])[: self.places]
+        return np.concatenate([clock * (_HELD if self.run.past is Past.FREE else 1.0), self._recorder_deviations])
 
     @property
     def _pace(self) -> Array:
@@ -343,7 +341,7 @@ class RigRecordError(RecordError):
     def instruments(self) -> list[tuple[object, ...]]:
         """Of which instrument each of k is: runs of one instrument have one clock and gain. The zero of a part's force
         is each run's own."""
-        names = ["clock", "lag", "gain", "droop", *(f"{what} of {one.name}" for what in ("gain", "lag")
+        names = [*["clock", "lag"][: self.places], "gain", "droop", *(f"{what} of {one.name}" for what in ("gain", "lag")
                                              for one in self.run.signals)]
         facts = self.run.facts
         return [*((name, facts.step_mps2, facts.range_mps2) for name in names),

@@ -261,8 +261,8 @@ def removed_from(posterior: Posterior, plain: Sequence[Array], state: State) -> 
     if not fitted - without_drift > LEAST_SHARE * fitted:
         drifts, without_drift = tuple(one.nothing_found() for one in drifts), fitted
 
-    clocks = [-k[:2] for one, k in zip(posterior.record_errors, state.record, strict=True)
-              if one.run.timed and at_recorded_distances > 2 * fitted]
+    clocks = [np.append(-k[: one.places], 0.0)[:2] for one, k in zip(
+        posterior.record_errors, state.record, strict=True) if one.run.timed and at_recorded_distances > 2 * fitted]
     faster, late_s = (float(max(some, key=abs, default=0.0)) for some in np.reshape(clocks, (-1, 2)).T)
 
     def share(power: float) -> float:
