@@ -341,8 +341,8 @@ class RigRecordError(RecordError):
     def instruments(self) -> list[tuple[object, ...]]:
         """Of which instrument each of k is: runs of one instrument have one clock and gain. The zero of a part's force
         is each run's own."""
-        names = [*["clock", "lag"][: self.places], "gain", "droop", *(f"{what} of {one.name}" for what in ("gain", "lag")
-                                             for one in self.run.signals)]
+        names = [*["clock", "lag"][: self.places], "gain", "droop",
+                 *(f"{what} of {one.name}" for what in ("gain", "lag") for one in self.run.signals)]
         facts = self.run.facts
         return [*((name, facts.step_mps2, facts.range_mps2) for name in names),
                 *[("zero", self.run.name)] * self.has_zero]
