@@ -274,6 +274,13 @@ BASE_INPUTS = ("height", "velocity", "acceleration")
 """What a mass on a base is driven by, in the order of its ``Structure.road``."""
 
 
+def to_ground(structure: Structure, wheel: float, body: float) -> Array:
+    """Matrix (n, n) of springs or dampers of these sizes between the ground and each wheel, and between the ground and
+    the body's end of each suspension."""
+    wheels, ends = structure.wheels, structure.travel + structure.wheels
+    return np.asarray(wheel * wheels.T @ wheels + body * ends.T @ ends)
+
+
 def mass_on_base(mass_kg: float, stiffness_n_per_m: float, damping_n_s_per_m: float) -> Structure:
     """The structure of one mass on a spring and a damper on a base, in its place x over the base:
     m x'' + c x' + k x = F - m z''."""

@@ -9,7 +9,7 @@ A single mass has one guide, which stands on the ground while its base moves.
 from dataclasses import replace
 
 from logger.vehicle.effect import BodyEffect, Parameter, Scale, Sought, Values
-from logger.vehicle.structure import BASE_INPUTS, Structure
+from logger.vehicle.structure import BASE_INPUTS, Structure, to_ground
 
 
 class FrameDamping(BodyEffect):
@@ -28,8 +28,7 @@ class FrameDamping(BodyEffect):
     also_by: tuple[str, ...] = ("body_damping_n_s_per_m",)
 
     def structure(self, p: Values, structure: Structure) -> Structure:
-        wheels, ends = structure.wheels, structure.travel + structure.wheels
-        drag = p.wheel_damping_n_s_per_m * wheels.T @ wheels + p.body_damping_n_s_per_m * ends.T @ ends
+        drag = to_ground(structure, p.wheel_damping_n_s_per_m, p.body_damping_n_s_per_m)
         return replace(structure, damping=structure.damping + drag)
 
 

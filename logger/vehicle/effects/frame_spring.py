@@ -10,7 +10,7 @@ A single mass has one such spring, which stands on the ground while its base mov
 from dataclasses import replace
 
 from logger.vehicle.effect import BodyEffect, Parameter, Scale, Sought, Values
-from logger.vehicle.structure import BASE_INPUTS, Structure
+from logger.vehicle.structure import BASE_INPUTS, Structure, to_ground
 
 
 class FrameSpring(BodyEffect):
@@ -29,8 +29,7 @@ class FrameSpring(BodyEffect):
     also_by: tuple[str, ...] = ("wheel_stiffness_n_per_m",)
 
     def structure(self, p: Values, structure: Structure) -> Structure:
-        wheels, ends = structure.wheels, structure.travel + structure.wheels
-        held = p.wheel_stiffness_n_per_m * wheels.T @ wheels + p.body_stiffness_n_per_m * ends.T @ ends
+        held = to_ground(structure, p.wheel_stiffness_n_per_m, p.body_stiffness_n_per_m)
         return replace(structure, stiffness=structure.stiffness + held)
 
 
