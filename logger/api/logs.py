@@ -24,7 +24,6 @@ if TYPE_CHECKING:
     from logger.chart_data import Chart
 
 
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Log(Mapping[str, npt.NDArray[Any]], Shown):
     """The intact rows of segment logs, n of them, one per window of the road; ``log["iri_m_per_km"]`` is a column.

@@ -19,7 +19,7 @@ of gravity, and a car at rest gives zeros.
 
 Source: A. V. Oppenheim and R. W. Schafer, Discrete-Time Signal Processing, 6.9.3 (pairing and ordering).
 
-Whole for a cascade of second-order sections, chosen so that nothing in it can overflow, whatever comes in.
+Integers for a cascade of second-order sections, chosen so that nothing in it can overflow, whatever comes in.
 
 Problem: with a word length given, too fine a scale overflows and too coarse a scale drowns the signal in rounding; and
 a gain in the frequency domain says nothing about the peaks of a signal that nobody has seen yet.
@@ -313,7 +313,6 @@ def _bound(paths: list[_Path]) -> float:
 
 def _energy_db(response: Array) -> float:
     return 10.0 * math.log10(max(float(np.sum(response**2)), 1e-300))
-
 
 
 FULL_SCALE_MPS2 = 16 * STANDARD_GRAVITY_MPS2  # the widest range of any accelerometer here

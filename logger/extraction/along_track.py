@@ -99,7 +99,6 @@ def passes(driven_m: Array, along_m: Array, aside_m: Array) -> list[Pass]:
     return found
 
 
-
 NEAREST_FIXES_S = 0.02
 """Fixes nearer to each other than that are one: no receiver sends 50 a second."""
 _WILD = 5.0  # deviations of a speed: noise alone is never so far off, and braking is not taken for it

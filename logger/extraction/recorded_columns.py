@@ -321,7 +321,6 @@ def fix_times_s(placed_s: Array, time_of_day_s: Array) -> Array:
     return times_s
 
 
-
 _LATE = 1.5  # of the usual pace
 _SLOWEST_S, _USUAL_S = 5.0, 1.0
 """Receivers and on-board diagnosis send once a second at least, the slowest receivers once in five."""

@@ -332,7 +332,6 @@ def _cut(road: Track, length_m: float) -> Track:
     return Track(road.spacing_m, road.elevation_m[:count], road.start_m)
 
 
-
 ISOLABLE_SIGMA = float(np.sqrt(INDISTINGUISHABLE))
 """Two effects are distinguishable where so many standard deviations of the one remain after the other is fitted: their
 square is the difference of the two scores."""

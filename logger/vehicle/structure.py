@@ -274,11 +274,15 @@ BASE_INPUTS = ("height", "velocity", "acceleration")
 """What a mass on a base is driven by, in the order of its ``Structure.road``."""
 
 
-def to_ground(structure: Structure, wheel: float, body: float) -> Array:
-    """Matrix (n, n) of springs or dampers of these sizes between the ground and each wheel, and between the ground and
-    the body's end of each suspension."""
+def held_to_ground(structure: Structure, by: str, body: float, wheel: float = 0.0) -> Structure:
+    """The structure with springs (``by`` its stiffness, sizes in N/m) or dampers (by its damping, N s/m) of these sizes
+    between the ground and the body's end of each suspension, and between the ground and each wheel."""
     wheels, ends = structure.wheels, structure.travel + structure.wheels
-    return np.asarray(wheel * wheels.T @ wheels + body * ends.T @ ends)
+    held = {by: getattr(structure, by) + wheel * wheels.T @ wheels + body * ends.T @ ends}
+    if structure.on_base:  # from which its place is counted, and which moves against the ground
+        held["road"] = structure.road.copy()
+        held["road"][0, BASE_INPUTS.index({"stiffness": "height", "damping": "velocity"}[by])] -= body
+    return replace(structure, **held)
 
 
 def mass_on_base(mass_kg: float, stiffness_n_per_m: float, damping_n_s_per_m: float) -> Structure:

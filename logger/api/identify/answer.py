@@ -67,7 +67,6 @@ from logger.vehicle.named_parameters import (
     free_parameter_named,
 )
 from logger.vehicle.uncertain import UNKNOWN, Known, NumberErrors
-from logger.vehicle.vehicle import Vehicle
 
 _FREE_WAVINESS = "road.waviness"
 # By how much the distances of two drives over one road may disagree.
@@ -141,7 +140,7 @@ def identify(question: IdentifyQuestion) -> Identification:
     drives = [run_on_road(one, question.warn) if not flat_will_do else one if isinstance(one, Run) else read_run(one)
               for one in given]
     model = model_of(with_initial_values(model_of(question.vehicle), drives))
-    records = _records(drives, model.vehicle)
+    records = _records(drives, model)
     if question.free is None and (question.road != MEASURED or question.obstacles):
         raise question.wrong("free", ": expected the parameters to fit, as the road was not measured")
     if question.road != MEASURED:
@@ -163,17 +162,17 @@ def _narrowed(question: IdentifyQuestion, drives: Sequence[Run]) -> IdentifyQues
     return replace(question, low_pass_hz=min((one for one in ends_hz if one is not None), default=None))
 
 
-def _records(drives: Sequence[Run], vehicle: Vehicle) -> list[Record]:
+def _records(drives: Sequence[Run], model: Model) -> list[Record]:
     """Drives with their roads, or on a flat one. BadInput for one too short, or that cannot be what it says, and for
     rates that differ."""
-    records = []
+    records, vehicle = [], model.vehicle
     for number, drive in enumerate(drives):
         lasts_s, past_s = len(drive.time_s) / drive.rate_hz, past_of(drive.track).value
         if not lasts_s - LEAST_SAMPLES / drive.rate_hz > past_s:
             raise BadInput(f"{drive.path}: expected {LEAST_SAMPLES} samples or more after the first {past_s:g} s, "
                            f"which are left out, found a drive of {lasts_s:g} s")
         check_readings(drive, drives[:number])
-        check_channels(drive, vehicle)
+        check_channels(drive, model)
         zero = 0.0 if zero_is_known(drive.facts.main, drive.track) else float(drive.accel_z_mps2.mean())
         record = Record(str(drive.path), drive.rate_hz, drive.accel_z_mps2 - zero, drive.distance_m, drive.speed_mps,
                         Track(1.0, np.zeros(2)) if drive.track is None else drive.track, past_s,

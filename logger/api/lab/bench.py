@@ -398,7 +398,7 @@ def bench_with(question: LabQuestion, searches: str | None = None, thin: bool = 
     drives = lab_drives(given.runs, question.warn)
     model = with_initial_values(model_of(given.vehicle), drives)
     off = tolerance_of(question.tolerance, model)
-    runs = checked_runs(drives, thin, model.vehicle)
+    runs = checked_runs(drives, thin, model)
     return bench_of(word_of(given.vehicle, model), model, runs, list(map(str, getattr(question, "effect_files", ()))),
                     off, searches, question.warn, question.low_pass_hz, question.anyway)
 

@@ -379,19 +379,20 @@ def with_initial_values(model: CarModel, drives: Sequence[Drive]) -> CarModel:
         if one.track is None or not one.track.timed:
             return model
         check_forces(model.vehicle, one.track, str(one.path / RUN))
-        check_channels(one, model.vehicle)
+        check_channels(one, model)
     runs = [run for one in drives for run in driven_stretches(one, past_of(one.track).value)]
     vehicle = at_time_scale(model.vehicle, unknown, runs)
     return replace(model, vehicle=vehicle, known={**model.known, **{
         name: replace(model.known[name], value=read_number(vehicle, name)) for name in unknown}})
 
 
-def checked_runs(drives: Sequence[Drive], thin: bool = True, vehicle: Vehicle | None = None) -> SimulatedRuns:
-    """Runs of one sample rate; of about 100 samples a second, or as many as the ``vehicle`` needs, if they have many
+def checked_runs(drives: Sequence[Drive], thin: bool = True, model: CarModel | None = None) -> SimulatedRuns:
+    """Runs of one sample rate; of about 100 samples a second, or as many as the ``model`` needs, if they have many
     more and may be thinned (``thin``).
 
     Raises BadInput for one that is not what ``check_record`` asks for, or stands nowhere on its own profile.
     """
+    vehicle = None if model is None else model.vehicle
     for number, drive in enumerate(drives):
         assert drive.track is not None
         if isinstance(drive.track, Track):
@@ -402,9 +403,9 @@ def checked_runs(drives: Sequence[Drive], thin: bool = True, vehicle: Vehicle | 
         check_record(drive, drives[:number], vehicle)
         if not drive.track.timed:
             check_distances(drive)
-        if vehicle is not None:
-            check_forces(vehicle, drive.track, str(drive.path / RUN))
-            check_channels(drive, vehicle)
+        if model is not None:
+            check_forces(model.vehicle, drive.track, str(drive.path / RUN))
+            check_channels(drive, model)
     runs = [run for one in drives for run in driven_stretches(one, least_s(one, vehicle))]
     if vehicle is not None and moves_freely(vehicle):
         runs = [of_rates(run) for run in runs]
@@ -548,9 +549,9 @@ def _swings_shrink(samples: Array) -> bool:
 _ORDERS = {"displacement": 0, "travel": 0, "velocity": 1, "acceleration": 2}
 
 
-def check_channels(drive: Drive, vehicle: Vehicle) -> None:
+def check_channels(drive: Drive, model: CarModel) -> None:
     """Raise BadInput for a channel of a rig that was at its end or out for a time, which no column ``usable`` says, and
-    for a force of the wrong sign."""
+    for a force of the wrong sign, as the model's effects have it act."""
     track, main = drive.track, drive.facts.main
     if not isinstance(track, Excitation):
         return
@@ -573,12 +574,14 @@ def check_channels(drive: Drive, vehicle: Vehicle) -> None:
         return np.interp(drive.time_s - drive.time_s[0], times_s, samples)
 
     part = track.moves_part and main.measures == "force"
-    alone = vehicle.model == "single_mass" and track.acts_on == (("body",),) and main.measures in _ORDERS
+    alone = model.vehicle.model == "single_mass" and track.acts_on == (("body",),) and main.measures in _ORDERS
     if part and goes_against(drive.accel_z_mps2, then(track.elevation_m), 0, range(2), drive.rate_hz):
         raise BadInput(f"{drive.file}: {main.name}: expected the force that pulls the part back, positive when it is "
                        "longer, found the opposite sign: change the sign of the force or of displacement_m")
-    if alone and track.force_n is not None and goes_against(
-            then(track.force_n[:, 0]), drive.accel_z_mps2, _ORDERS[main.measures], range(3), drive.rate_hz):
+    with as_bad_input(model.vehicle.name):
+        acting_n = track.as_it_is((), compose(model.vehicle, model.effects).structure.actuators).force_n
+    if alone and acting_n is not None and goes_against(
+            then(acting_n[:, 0]), drive.accel_z_mps2, _ORDERS[main.measures], range(3), drive.rate_hz):
         raise BadInput(f"{drive.file}: {main.name}: expected it to follow {track.forces[0].name}, found the opposite "
                        "sign: change the sign of one of them (both are positive up)")
 

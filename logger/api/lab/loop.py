@@ -435,7 +435,6 @@ def _place(story: Story) -> Curves:
         "residual finally": after.residuals.residual})
 
 
-
 def figures_of(found: Assessment) -> dict[str, Any]:
     """Figures of the windows in which the car moved; its ``comparison`` with the profile must be there."""
     return figures(found, found.windows.speed_mps > 0)

@@ -9,7 +9,7 @@ A single mass has one guide, which stands on the ground while its base moves.
 from dataclasses import replace
 
 from logger.vehicle.effect import BodyEffect, Parameter, Scale, Sought, Values
-from logger.vehicle.structure import BASE_INPUTS, Structure, to_ground
+from logger.vehicle.structure import Structure, held_to_ground
 
 
 class FrameDamping(BodyEffect):
@@ -28,8 +28,7 @@ class FrameDamping(BodyEffect):
     also_by: tuple[str, ...] = ("body_damping_n_s_per_m",)
 
     def structure(self, p: Values, structure: Structure) -> Structure:
-        drag = to_ground(structure, p.wheel_damping_n_s_per_m, p.body_damping_n_s_per_m)
-        return replace(structure, damping=structure.damping + drag)
+        return held_to_ground(structure, "damping", p.body_damping_n_s_per_m, p.wheel_damping_n_s_per_m)
 
 
 class _MassDamping(FrameDamping):
@@ -41,9 +40,7 @@ class _MassDamping(FrameDamping):
     also_by = ()
 
     def structure(self, p: Values, structure: Structure) -> Structure:
-        road = structure.road.copy()  # its place is counted from the base, which moves against the guide
-        road[0, BASE_INPUTS.index("velocity")] -= p.body_damping_n_s_per_m
-        return replace(structure, damping=structure.damping + p.body_damping_n_s_per_m, road=road)
+        return held_to_ground(structure, "damping", p.body_damping_n_s_per_m)
 
 
 EFFECT = FrameDamping()

@@ -10,7 +10,7 @@ A single mass has one such spring, which stands on the ground while its base mov
 from dataclasses import replace
 
 from logger.vehicle.effect import BodyEffect, Parameter, Scale, Sought, Values
-from logger.vehicle.structure import BASE_INPUTS, Structure, to_ground
+from logger.vehicle.structure import Structure, held_to_ground
 
 
 class FrameSpring(BodyEffect):
@@ -29,8 +29,7 @@ class FrameSpring(BodyEffect):
     also_by: tuple[str, ...] = ("wheel_stiffness_n_per_m",)
 
     def structure(self, p: Values, structure: Structure) -> Structure:
-        held = to_ground(structure, p.wheel_stiffness_n_per_m, p.body_stiffness_n_per_m)
-        return replace(structure, stiffness=structure.stiffness + held)
+        return held_to_ground(structure, "stiffness", p.body_stiffness_n_per_m, p.wheel_stiffness_n_per_m)
 
 
 class _MassSpring(FrameSpring):
@@ -41,9 +40,7 @@ class _MassSpring(FrameSpring):
     also_by = ()
 
     def structure(self, p: Values, structure: Structure) -> Structure:
-        road = structure.road.copy()  # its place is counted from the base, which moves against the ground
-        road[0, BASE_INPUTS.index("height")] -= p.body_stiffness_n_per_m
-        return replace(structure, stiffness=structure.stiffness + p.body_stiffness_n_per_m, road=road)
+        return held_to_ground(structure, "stiffness", p.body_stiffness_n_per_m)
 
 
 EFFECT = FrameSpring()
