@@ -231,6 +231,10 @@ class LabDiagnosis:
         one = self.signals.get(signal)
         return (self.final_error if one is None else one.after) if self.exceeds_noise else 0.0
 
+    def is_off(self, signal: str) -> bool:
+        """Whether one of ``signals_off`` is so for sure."""
+        return abs(self.signals_off[signal]) > self.left_of(signal)
+
     @property
     def contradicted_by(self) -> tuple[str, ...]:
         """Signals whose residual alone is above their noise: they contradict the others."""

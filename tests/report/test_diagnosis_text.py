@@ -91,12 +91,16 @@ def test_what_is_missing_is_said_with_its_numbers_and_how_probable_noise_is() ->
 
 
 def test_a_signal_that_contradicts_the_others_is_named() -> None:
-    (off,) = (one for one in diagnosis_summary(replace(FOUND, signals_off={"travel_m": 0.052})) if "travel_m" in one)
+    sure = replace(FOUND, signals_off={"travel_m": 0.052})
+    (off,) = (one for one in diagnosis_summary(sure) if "travel_m" in one)
     assert off.startswith("travel_m is +5.2% off against all other signals")
     hedged = replace(FOUND, excess=3.0, signals_off={"travel_m": 0.052},
                      signals={"travel_m": SignalErrors(0.7, 0.139, 0.003)})
     assert any(one.startswith("travel_m may be +5.2% off") and "leaves 13.9% of the signal" in one
                for one in diagnosis_summary(hedged))
+    for found, *shares in ((sure, {"travel_m": 0.052}, {}), (hedged, {}, {"travel_m": 0.052})):
+        said = diagnosis_json(found)
+        assert [said["signals_in_conflict"], said["signals_perhaps_in_conflict"]] == shares
     left = replace(FOUND, excess=3.0, excess_of={"": 0.0, "travel_m": 3.0})
     assert any(one.startswith("It appears only in travel_m") for one in diagnosis_summary(left))
     everywhere = replace(left, excess_of={"": 0.5, "travel_m": 3.0})

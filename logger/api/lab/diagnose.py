@@ -331,9 +331,9 @@ def diagnosis_summary(found: LabDiagnosis) -> list[str]:
         lines.append(f"In the worst run the residual is {_left_over(found)}: calibration errors of the sensors may "
                      f"leave as much{of_motion}")
     lines += [f"{name} is {share:+.1%} off against all other signals, more than a calibration error: check its scale "
-              "and its unit. The search for effects corrected it." if abs(share) > (rest := found.left_of(name)) else
+              "and its unit. The search for effects corrected it." if found.is_off(name) else
               f"{name} may be {share:+.1%} off against all other signals. What is missing may cause that as well: it "
-              f"leaves {rest:.1%} of the signal. The search for effects corrected it."
+              f"leaves {found.left_of(name):.1%} of the signal. The search for effects corrected it."
               for name, share in found.signals_off.items()]
     lines += _car(found)
     errors, *rises = lab_words.error_words(found.steps, found.noise_floor_error)
@@ -498,7 +498,9 @@ def diagnosis_json(found: LabDiagnosis) -> dict[str, Any]:
             "effect": found.as_moved.effect.name, "parameters": dict(found.as_moved.values)},
         "signals": {name: {"baseline_error": one.before, "final_error": one.after, "noise_floor_error": one.noise_floor}
                     for name, one in found.signals.items()},
-        "signals_in_conflict": dict(found.signals_off), "contradicted_by": list(found.contradicted_by),
+        **{key: {name: share for name, share in found.signals_off.items() if found.is_off(name) is sure}
+           for key, sure in (("signals_in_conflict", True), ("signals_perhaps_in_conflict", False))},
+        "contradicted_by": list(found.contradicted_by),
         "force_gain": found.force_gain,
         "explained_power": {"refitted": found.explained[0], "final": found.explained[1],
                             "best_linear": found.best_linear},

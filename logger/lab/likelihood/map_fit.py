@@ -328,10 +328,11 @@ def with_dimensions(linear: LinearModel, effects: Sequence[Chosen], free_paramet
         value = effects[free.effect].values[parameter.name]
         names.append(parameter.name)
         per_log.append(value * slope_of(parameter, value))
-    by_log = np.array(per_log)[:, None]
+    slopes = linear.numbers if own is None else list(map(np.vstack, zip(linear.numbers, own, strict=True)))
+    # What moves nothing, such as a stop out of reach, bears no part of what the differences are off by.
+    by_log = (np.array(per_log) * np.any([one.any(axis=1) for one in slopes], axis=0))[:, None]
     powers = np.array([dimensions_of(name)[: len(wanted[0])] for name in names], float) * (by_log != 0)
     share = np.linalg.pinv(powers).T / np.where(by_log == 0, 1.0, by_log)
-    slopes = linear.numbers if own is None else list(map(np.vstack, zip(linear.numbers, own, strict=True)))
     freed = [one - share @ (powers.T @ (by_log * one) - right) for one, right in zip(slopes, wanted, strict=True)]
     p = linear.count
     return linear.with_number_slopes([one[:p] for one in freed]), None if own is None else [one[p:] for one in freed]

@@ -139,6 +139,14 @@ def test_a_number_that_changes_nothing_is_wholly_uncertain_and_leaves_the_others
     assert deviations == pytest.approx(alone, rel=0.1)
 
 
+def test_a_stop_out_of_reach_is_wholly_uncertain_though_a_car_of_larger_forces_moves_alike() -> None:
+    stop = hidden("bump_stop", clearance_m=0.29, stop_stiffness_n_per_m=1e5)
+    posterior, state = found().posterior, found().state
+    more = posterior.state_at([*state.effects, stop], state.logs, state.record, state.size)
+    (_, unmet), _ = errors_of(LinearModel(posterior, more, found().numbers))
+    assert {*unmet.standard_errors.values()} == {np.inf}
+
+
 @pytest.mark.parametrize("name, key, value, error", [
     ("tire_damping", NAME, 150.0, 50.0),
     ("tire_damping", NAME, 0.0, 50.0),
