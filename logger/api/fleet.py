@@ -66,7 +66,7 @@ def fleet_ingest(question: IngestQuestion) -> Ingested:
 
     _needs_arrow()
     dataset, trim_m, roads = Dataset(Path(question.to)), question.trim_m, question.roads
-    named = [(log, log.resolve().parent.name if question.car_folders else question.car or _car_of(log))
+    named = [(log, _folder_of_car(log, question.places) if question.car_folders else question.car or _car_of(log))
              for log, _ in find_logs_in(question.places)]
     with dataset.writing():
         key = own_key(dataset.folder)
@@ -166,6 +166,16 @@ def _keys(dataset: Dataset, roads: Path | None) -> Iterator[tuple[Keyed, str]]:
     if dataset.is_new:
         replace_bytes(dataset.folder / _ROADS, content)
     yield RoadMap(pieces).keys, digest
+
+
+def _folder_of_car(log: Path, places: list[Path]) -> str:
+    """The name of the folder in a place that holds a car's logs, or its sticks; a place without one is itself a
+    car's."""
+    from logger.store.export.manifest import FOLDER
+
+    place = next(place for place in places if log.is_relative_to(place))
+    inside = log.relative_to(place).parts[:-1]
+    return inside[0] if inside and inside[0] != FOLDER else (place if place.is_dir() else place.parent).resolve().name
 
 
 def _car_of(log: Path) -> str:

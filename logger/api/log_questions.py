@@ -205,7 +205,8 @@ class IngestQuestion(LogsQuestion):
     car: Annotated[str | None, Option(
         "the car's name (default: the vehicle's name in the sidecar of each log; give one where cars share it)",
         metavar="NAME")] = None
-    car_folders: Annotated[bool, Option("each car has its own folder of logs, named after the car")] = False
+    car_folders: Annotated[bool, Option(
+        "each folder in LOGS holds the logs or sticks of one car, and is named after it")] = False
     roads: Annotated[Path | str | None, Option(
         "map of the roads to which windows are assigned, at the first ingest (default: squares of 66 ft on the "
         "ground)",

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Annotated
 
 from drivers.dump import open_dump
-from logger.files import make_folder, note
+from logger.files import make_folder, naming, note
 from logger.printable import counted
 from logger.question import Answer, Argument, LongQuestion, Option, Verb
 from logger.service.config import load_config
@@ -74,7 +74,7 @@ def replayed(asked: ReplayQuestion) -> Outcome:
         known = wiring.receiver_for_dump(reader.header, config, place=f"{dump}:1")
         facts = wiring.sidecar(config, sensor, car, known, noise) | {"replayed_from": dump.name}
         make_folder(out)
-        with FolderLock(out):
+        with FolderLock(out), naming(out):
             repair(out)
             session = next_session(out)
             pipeline = wiring.pipeline(config, sensor, car, known)

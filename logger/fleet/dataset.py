@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     import pyarrow
 
 
-EXTRA = "expected the 'fleet' extra: pip install '.[fleet]' in the folder of ridelog's source ({})"
+EXTRA = "expected the 'fleet' extra: pip install 'ridelog[fleet]' ({})"
 _MANIFEST = "manifest.json"
 _FORMAT = 1
 _EPOCH_MONTH = 1970 * 12

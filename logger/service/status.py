@@ -128,10 +128,12 @@ class ServiceStatus:
 
 
 def write_status(path: Path, status: ServiceStatus) -> None:
-    """Put the snapshot into place in one step. Raises OSError where that cannot be done.
+    """Put the snapshot into place in one step; its folder too, where no unit made it. Raises OSError where that cannot
+    be done.
 
     There is no fsync: the file lies in memory, and after a power cut nobody is there whom it could describe.
     """
+    path.parent.mkdir(parents=True, exist_ok=True)
     new = path.with_name(path.name + ".new")
     new.write_text(json.dumps(asdict(status)) + "\n", encoding="utf-8")
     new.replace(path)

@@ -130,7 +130,7 @@ def test_what_takes_long_without_a_compiler_is_said_before(
     with pytest.raises(TypeError):
         main([*COMMANDS[command](tmp_path), "--vehicle", car, *runs])
     reported = capsys.readouterr().err
-    assert "Without the lab extra (pip install '.[lab]') simulations with wheel_lift take" in reported
+    assert "Without the lab extra (pip install 'ridelog[lab]') simulations with wheel_lift take" in reported
     assert reported.count("\n") == 1
 
 
@@ -143,7 +143,7 @@ def test_a_search_that_could_not_try_every_effect_is_refused(
     out = tmp_path / "out"
     given = ["demo", "--lab", "--out", str(out)] if command == "demo" else [
         *COMMANDS[command](tmp_path), "--vehicle", "rav4-2009", *runs]
-    words = rf"the lab extra \(pip install '\.\[lab\]'\).* [1-9]\d* of {len(sought_effects())} effects"
+    words = rf"the lab extra \(pip install 'ridelog\[lab\]'\).* [1-9]\d* of {len(sought_effects())} effects"
     with pytest.raises(BadInput, match=words) as refused:
         main(given)
     assert "\n" not in str(refused.value)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import csv
+import errno
 import gzip
 import json
+import os
 import re
 import subprocess
 import zlib
@@ -13,7 +15,9 @@ from pathlib import Path
 
 import pytest
 
+from drivers.disk import FileSystem
 from drivers.dump import DumpHeader, DumpWriter, Event
+from logger.commands.main import main
 from logger.estimation.drive_spectra import spectra_of_fields
 
 from ..support.command import called
@@ -169,6 +173,18 @@ def test_no_such_recording(tmp_path: Path) -> None:
     assert done.returncode == 2
     assert "none.dump" in done.stderr
     assert done.stderr.count("\n") == 1
+
+
+def test_a_disk_that_is_full_is_named(
+    short_dump: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def full(self: FileSystem, descriptor: int) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(FileSystem, "sync", full)
+    with pytest.raises(OSError, match="No space left") as refused:
+        main(["replay", str(short_dump), "--out", str(tmp_path)])
+    assert refused.value.filename == str(tmp_path)
 
 
 def test_a_report_never_replaces_a_device(replayed: tuple[Path, str], tmp_path: Path) -> None:

@@ -233,6 +233,18 @@ def test_cars_have_their_names_and_for_others_pseudonyms_which_the_owner_can_loo
     assert cars() == hidden
 
 
+@pytest.mark.parametrize(("inside", "named"), [
+    ("", "depot"), ("", "depot/van 7"), ("", "depot/van 7/00001-001.csv"), ("2026-05", "depot"),
+    ("ridelog/0a1b", "depot"), ("ridelog/0a1b", "depot/van 7")])
+def test_a_car_is_named_after_its_folder_however_its_logs_lie_in_it(inside: str, named: str, tmp_path: Path) -> None:
+    write_logs(drives(town(1, 200.0, 2), 1), tmp_path / "made")
+    folder = tmp_path / "depot" / "van 7" / inside
+    folder.parent.mkdir(parents=True)
+    next((tmp_path / "made").iterdir()).rename(folder)
+    assert main(["fleet", "ingest", str(tmp_path / named), "--to", str(tmp_path / "town"), "--car-folders"]) == 0
+    assert ",van 7" in (tmp_path / "town.cars.csv").read_text("utf-8")
+
+
 def test_two_cars_with_a_drive_each_are_not_judged(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     place = town(1, 200.0, 2)
     found = drives(place, 2)

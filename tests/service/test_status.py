@@ -37,14 +37,14 @@ STATUS = ServiceStatus(
 
 
 def test_what_was_written_is_what_is_read(tmp_path: Path) -> None:
-    path = tmp_path / "status.json"
+    path = tmp_path / "ridelog" / "status.json"  # no unit has made the folder
     assert read_status(path) is None
     write_status(path, replace(STATUS, last_window=None))
     known = replace(STATUS, notices=("roll is not corrected", "another"), receiver_delay="0.14 ± 0.02 s",
                     receiver_delay_s=0.14, receiver_delay_std_s=0.02)
     write_status(path, known)
     assert read_status(path) == known
-    assert list(tmp_path.iterdir()) == [path]
+    assert list(path.parent.iterdir()) == [path]
 
 
 @pytest.mark.parametrize("text", ["", "{", "[]", "null", "{}", '{"state": "recording"}', "\xff", "[" * 90_000,

@@ -368,7 +368,7 @@ def slow(effects: Iterable[Effect]) -> list[str]:
 def slow_words(effects: Iterable[Effect]) -> str:
     """That simulations with these effects take long, if they do."""
     if names := slow(effects):
-        return (f"Without the lab extra (pip install '.[lab]') simulations with {' and '.join(names)} take some "
+        return (f"Without the lab extra (pip install 'ridelog[lab]') simulations with {' and '.join(names)} take some "
                 f"hundred times longer: {_SLOW}.")
     return ""
 
@@ -379,8 +379,8 @@ def require_compiler(command: str, effects: Collection[Effect]) -> None:
     A search over the rest alone could not say that nothing is missing, nor that an effect explains most.
     """
     if names := slow(effects):
-        raise BadInput(f"{command} needs the lab extra (pip install '.[lab]'), which is not installed: without it "
-                       f"{len(names)} of {len(effects)} effects cannot be tried, and its answer would mislead")
+        raise BadInput(f"{command} needs the lab extra (pip install 'ridelog[lab]'), which is not installed: without "
+                       f"it {len(names)} of {len(effects)} effects cannot be tried, and its answer would mislead")
 
 
 def _try_own(found: Bench, files: Sequence[str]) -> None:
