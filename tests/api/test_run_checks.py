@@ -98,6 +98,10 @@ def test_a_rig_that_rests_until_it_is_struck_loses_no_beginning(rang_mps2: float
                                   excitation=struck), shortest_s=3.0)
     assert run.first == (1000 if rang_mps2 else 0)
     if not rang_mps2:
+        coarse = 0.1 + 0.02 * np.round(np.cumsum(np.cumsum(rings)) * 2e-4)  # an encoder reads the same throughout
+        (read,) = driven_stretches(Run(Path("run"), 500.0, time_s, coarse, still, still, None, None, excitation=struck),
+                                   shortest_s=3.0)
+        assert read.first == 0
         noisy = replace(run, measured_mps2=run.measured_mps2 + rng.normal(0, 0.5, 2000))
         car = compose(Vehicle("rig", "single_mass", 1.0, None, Axle(0.0, 0.0, 1421.0, 4.0, 0.0), None, 0.0))
         assert noisy.begins_in_motion and not begins_unknown(car, noisy)

@@ -506,6 +506,7 @@ def _rests_until_driven(run: Run) -> bool:
     first = int(np.argmax((driven > _NOT_DRIVEN * driven.max(axis=0)).any(axis=1)))
     count = int((first / track.rate_hz + track.start_s) * run.rate_hz)
     still = np.stack([run.measured_mps2, *run.more])[:, :max(count, 0)]
+    still = still - still[:, :1]  # exactly 0 where a coarse sensor reads the same throughout
     return count >= _FEWEST_AT_REST and bool((np.diff(still).var(axis=1) >= still.var(axis=1)).all())
 
 

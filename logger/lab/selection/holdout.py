@@ -52,6 +52,12 @@ class HoldOut:
     deviance: float
     signals: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
+    @property
+    def largest(self) -> float:
+        """The largest error of a signal, of the further ones beyond its noise."""
+        return max([self.error, *(max(error**2 - noise**2, 0.0)**0.5 for name, (error, noise) in self.signals.items()
+                                  if name)])
+
     def explains_most_beyond(self, without: HoldOut) -> bool:
         """Whether more than half of the power that a smaller model leaves is explained."""
         return self._left_of(without) < most_of(1.0)

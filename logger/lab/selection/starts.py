@@ -126,9 +126,9 @@ class UnknownNumbers(MeasuredRoad):
         others are tried with these. In the place of an effect they begin with what the model with it has shown, and
         that effect itself is left out where it ends there again."""
         local = super().screened(base, effects, seen, near, pool, progress)
-        # Were numbers far off, the car's resonances would be, and leave more than so little of what was measured, or a
-        # signal's gain would be, which had to make up for it.
-        if ((base.explanation == 0 or base.hold_out.error < UNEXPLAINED)
+        # Were numbers far off, the car's resonances would be, and leave more than so little of one of the signals, or
+        # a signal's gain would be, which had to make up for it.
+        if ((base.explanation == 0 or base.hold_out.largest < UNEXPLAINED)
                 and not base.posterior.prior.is_contradicted_by(base.state.logs)
                 and not signals_off(base.posterior.record_errors, base.state.record)):
             return local

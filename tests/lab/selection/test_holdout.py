@@ -61,6 +61,7 @@ def test_most_is_explained_of_all_signals_each_by_what_is_left_of_it_beyond_its_
     assert errors(0.02, 0.40, 0.399).explains_most_beyond(errors(0.65, 0.41, 0.399))  # what it left of it was noise
     assert errors(0.10, 0.20, 0.003).is_worse_than(errors(0.11, 0.10, 0.003))
     assert errors(0.34, 0.02, 0.003).is_worse_than(errors(0.28, 0.50, 0.003))  # that of the first signal rises
+    assert errors(0.06, 0.50, 0.3).largest == pytest.approx(0.4) and errors(0.06, 0.3, 0.3).largest == 0.06
 
 
 # --- against fits ---

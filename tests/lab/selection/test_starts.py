@@ -15,6 +15,7 @@ from logger.lab.likelihood.posterior import State
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.selection import starts
+from logger.lab.selection.holdout import HoldOut
 from logger.lab.selection.screening import Baseline
 from logger.lab.selection.starts import Started, UnknownNumbers
 from logger.vehicle.effect import Misalignment
@@ -119,6 +120,21 @@ def test_more_starts_are_improved_until_two_end_alike_and_what_ends_at_the_model
         without = search.without(now, "sensor_mount_resonance")
         assert not search.screened(without, effects, still, there.effects[0], pool, lambda words: None)
         assert search.screened(without, effects, still, None, pool, lambda words: None)
+
+
+@pytest.mark.slow
+def test_cars_are_drawn_where_any_signal_is_left_beyond_its_noise(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As of a rig whose body follows its rail at 6 % while its wheel is a quarter off: fits lead nowhere from there."""
+    posterior = posterior_of(secret_runs([hidden("dry_friction", friction_force_n=200.0)], lasts_s=4.0),
+                             tolerance=Tolerance(numbers=0.5))
+    search = UnknownNumbers(draws=4)
+    base, left = search.fitted(posterior, ()), HoldOut(0.06, 0.0)
+    monkeypatch.setattr(Baseline, "hold_out", property(lambda _: left))
+    with ThreadPoolExecutor(1) as pool:
+        for wheel, noise, draws in ((0.27, 0.003, True), (0.27, 0.26, False)):
+            left = HoldOut(0.06, 0.0, {"": (0.06, 0.003), "wheel_m": (wheel, noise)})
+            one, = search.screened(base, [EFFECTS["dry_friction"]], Misalignment(1.0, 0.0), None, pool, lambda _: None)
+            assert isinstance(one, Started) is draws
 
 
 @pytest.mark.slow
