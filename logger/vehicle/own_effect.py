@@ -279,13 +279,22 @@ def _look_through(one: Parameter) -> None:
     if not one.name.isidentifier() or one.name in KEYS:
         raise ValueError(f"expected a parameter's name of letters, digits and _, none of {', '.join(KEYS)}; "
                          f"found {one.name!r}")
+    if not isinstance(one.scale, Scale):
+        raise ValueError(f"{one.name}: expected one of {', '.join(map(str, Scale))} as scale, found {one.scale!r}")
+    if not all(isinstance(value, Real) for value in (one.low, one.start, one.high)):
+        raise ValueError(f"{one.name}: expected numbers as low, start and high, found {one.low!r}, {one.start!r}, "
+                         f"{one.high!r}")
     if not (np.isfinite([one.low, one.high]).all() and one.low <= one.start <= one.high):
         raise ValueError(f"{one.name}: expected finite low <= start <= high, found {one.low}, {one.start}, {one.high}")
     if one.scale is not Scale.LINEAR and one.low <= 0:
         raise ValueError(f"{one.name}: expected low above 0 for a scale that is {one.scale.value}, found {one.low}")
+    if one.null is not None and not (isinstance(one.null, Real) and (
+            one.low <= one.null <= one.high or np.isinf(one.null))):
+        raise ValueError(f"{one.name}: expected null to be None, infinite, or within {one.low} to {one.high}, "
+                         f"found {one.null!r}")
     if one.step is not None and not 0 < one.step < float("inf"):
         raise ValueError(f"{one.name}: expected a step above 0, found {one.step}")
-    if not one.trials:
+    if not isinstance(one.trials, tuple) or not one.trials:
         raise ValueError(f"{one.name}: expected trials, the values that a search begins at, as in ({one.start},)")
     if one.is_free and all(value == one.null for value in one.trials):
         raise ValueError(f"{one.name}: expected trials away from {one.null}, where the effect does nothing")
