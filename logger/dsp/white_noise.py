@@ -73,6 +73,8 @@ def answered(samples: Array, answer: Array, rate_hz: float, up_to_hz: float) -> 
     """Shares (n,) of the amplitudes of samples (n,), by frequency as ``Denoised``'s, that may be motion, given the
     force (n,) with which a spring and a damper, or what is like them, answer it; all of them above ``up_to_hz``."""
     count = len(samples)
+    if not np.ptp(samples):
+        return np.ones(count)
     f_hz = np.fft.rfftfreq(count, 1 / rate_hz)
     moved, found = (np.fft.rfft(np.hanning(count) * (one - np.linspace(one[0], one[-1], count)))
                     for one in (samples, answer))

@@ -7,7 +7,7 @@ allows is reported: a missing effect biases it.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,6 +16,7 @@ from logger.arrays import Array
 from logger.bounds import DISCREPANCY
 from logger.lab.likelihood.noise_floor import (
     Repeats,
+    excess_by_signal,
     find_repeats,
     floor_error,
     sensor_noise_with_rounding,
@@ -25,11 +26,13 @@ from logger.lab.likelihood.posterior import Posterior
 from logger.lab.likelihood.priors import Tolerance
 from logger.lab.likelihood.record_band import ComparedBand, compared_band
 from logger.lab.likelihood.standard_errors import standard_errors
+from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.residual_tests import run_residual_tests
 from logger.lab.residual_tests.tests import ResidualEvidence, ResidualTestResult, ResidualTestResults
 from logger.lab.residuals.breakdown import Breakdown, ModelResiduals, breakdown
 from logger.lab.residuals.force_gain import force_gain
 from logger.lab.residuals.unexplained import Removed, removed_from
+from logger.lab.selection.evidence import FALSE_ALARM
 from logger.lab.selection.holdout import REFITTED, ErrorStep, as_filed, cross_validate
 from logger.lab.selection.starts import fitted_from_starts
 from logger.runs import normalised_rms_error
@@ -73,6 +76,7 @@ class LabComparison:
     removed     sensor drift, distance error and filtering, which are removed from the error before it is judged
     tests       of the residuals of the refitted model, without the drift of its sensors
     force_gain  how many times what they say the forces that drive a rig count, as ``force_gain``
+    excess_of   as ``excess_by_signal`` of the refitted model, where more than one signal was measured
     """
 
     vehicle: str
@@ -86,6 +90,12 @@ class LabComparison:
     removed: Removed
     tests: ResidualTestResults
     force_gain: float | None = None
+    excess_of: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def unexplained_signals(self) -> tuple[str, ...]:
+        """Signals beside the first whose residual is above their noise."""
+        return tuple(name for name, excess in self.excess_of.items() if name and excess > UNEXPLAINED)
 
     @property
     def band(self) -> ComparedBand | None:
@@ -144,7 +154,8 @@ def compare(runs: SimulatedRuns, vehicle: Vehicle, effects: Sequence[Chosen] = (
                          (ErrorStep(as_filed(posterior.tolerance), plain.error),
                           ErrorStep(REFITTED, cross_validate(linear).error)),
                          floor_error(posterior, sensor_noise_with_rounding(posterior, state)),
-                         removed, _tests(refitted, removed, runs.predict(car)), force_gain(linear))
+                         removed, _tests(refitted, removed, runs.predict(car)), force_gain(linear),
+                         excess_by_signal(posterior, state, FALSE_ALARM) if refitted.signals else {})
 
 
 def _tests(refitted: Standing, removed: Removed, as_recorded: Sequence[Array]) -> ResidualTestResults:

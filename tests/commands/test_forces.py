@@ -1113,21 +1113,38 @@ def test_the_zeros_of_sensors_are_in_no_error(tmp_path: Path, capsys: pytest.Cap
 
 
 @pytest.mark.parametrize(("times", "words"), [
-    (-1.0, r"found -\S+ times what the model says: it looks like the opposite sign \("), *slow(
+    (-1.0, r"found -\S+ times what the model says: it looks like the opposite sign \("),
+    (0.0, "drive.csv: expected displacement_m after the first 2 s, found zeros only"), *slow(
         (1000.0, r"expected displacement_m in m, found \d+ times .* it looks like mm \("), (2.0, None))],
-    ids=["turned over", "mm", "twice"])
-def test_another_unit_or_sign_of_another_signal_is_said(tmp_path: Path, times: float, words: str | None) -> None:
+    ids=["turned over", "none", "mm", "twice"])
+def test_another_unit_or_sign_of_another_signal_is_said(
+        tmp_path: Path, times: float, words: str | None, capsys: pytest.CaptureFixture[str]) -> None:
     """Its spring a third too soft in the file; a gain of two is no unit."""
     bench, push, seen = ringing(6.0)
     (tmp_path / "bench.yaml").write_text(bench.yaml.replace("2000.0", "1500 +- 30%"))
-    run = written(tmp_path / "run", {"accel_z_mps2": seen["accel_z_mps2"],
+    run = written(tmp_path / "run", {**{name: seen[name] for name in ("accel_z_mps2", "velocity_mps", "travel_m")},
                                      "displacement_m": times * seen["displacement_m"]}, {"force_n": push(TIME_S)}, BODY)
     asked = ["compare", "--vehicle", str(tmp_path / "bench.yaml"), str(run)]
     if words is None:
         assert main(asked) == 0
-    else:
-        with pytest.raises(BadInput, match=words):
-            main(asked)
+        return
+    with pytest.raises(BadInput, match=words):
+        main(asked)
+    if times:
+        assert main([*asked, "--anyway"]) == 0
+        assert "it leaves more than noise of displacement_m." in capsys.readouterr().out.replace("\n", " ")
+
+
+def test_a_mass_that_its_base_moves_against_the_force_on_it_is_not_called_upside_down(
+        tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    bench, push, _ = ringing(6.0)
+    base = Course(RATE_HZ, -2.0 * push(TIME_S) / bench.spring)
+    seen = bench.moved(base, push, NOTHING)["accel_z_mps2"]
+    run = written(tmp_path / "run", {"accel_z_mps2": seen}, {"elevation_m": base(TIME_S), "force_n": push(TIME_S)},
+                  BODY)
+    (tmp_path / "bench.yaml").write_text(bench.yaml)
+    assert main(["compare", "--vehicle", str(tmp_path / "bench.yaml"), "--json", str(run)]) == 0
+    assert json.loads(capsys.readouterr().out)["error"] < 0.02
 
 
 @pytest.mark.slow

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from logger.dsp.white_noise import without_white_noise
+from logger.dsp.white_noise import answered, without_white_noise
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Way
 
@@ -90,3 +90,8 @@ def test_what_a_damper_does_not_answer_is_noise(hum_m: float, shakes_m: float, n
         assert off_mps > 0.011 > 0.004 > left_mps
     else:
         assert np.abs(answered - as_read).max() < 1e-5
+
+
+def test_nothing_of_what_stands_still_is_noise() -> None:
+    force_n = np.random.default_rng(1).standard_normal(500)
+    assert answered(np.zeros(500), force_n, 500.0, 100.0).tolist() == [1.0] * 500

@@ -575,7 +575,8 @@ def check_channels(drive: Drive, model: CarModel) -> None:
         return np.interp(drive.time_s - drive.time_s[0], times_s, samples)
 
     part = track.moves_part and main.measures == "force"
-    alone = model.vehicle.model == "single_mass" and track.acts_on == (("body",),) and main.measures in _ORDERS
+    alone = (model.vehicle.model == "single_mass" and track.acts_on == (("body",),) and main.measures in _ORDERS
+             and not track.elevation_m.any())
     if part and goes_against(drive.accel_z_mps2, then(track.elevation_m), 0, range(2), drive.rate_hz):
         raise BadInput(f"{drive.file}: {main.name}: expected the force that pulls the part back, positive when it is "
                        "longer, found the opposite sign: change the sign of the force or of displacement_m")
@@ -705,6 +706,17 @@ def check_record(drive: Drive, others: Sequence[Drive], vehicle: Vehicle | None 
     if lasts_s < shortest_s:
         raise BadInput(f"{drive.file}: expected a record of {shortest_s:.3g} s or longer, found {lasts_s:.3g} s")
     check_readings(drive, others)
+    for signal in drive.facts.signals:
+        _check_varies(drive, signal, drive.more[signal.name], signal.name)
+
+
+def _check_varies(drive: Drive, signal: Signal, samples: Array, said: str) -> None:
+    """Raise BadInput for a signal that is one number wherever it counts."""
+    past_s = past_of(drive.track).value
+    counted = samples[int(past_s * drive.rate_hz):]
+    if np.ptp(counted) == 0:
+        found = f"{counted[0]:g} {signal.unit} throughout" if counted[0] else "zeros only"
+        raise BadInput(f"{drive.file}: expected {said} after the first {past_s:g} s, found {found}")
 
 
 def check_readings(drive: Drive, others: Sequence[Drive]) -> None:
@@ -716,11 +728,8 @@ def check_readings(drive: Drive, others: Sequence[Drive]) -> None:
                        f"{drive.rate_hz:g}")
     counted = drive.accel_z_mps2[int(past_s * drive.rate_hz):]
     is_acceleration = drive.facts.main.measures == "acceleration"
-    if np.ptp(counted) == 0:
-        unit = " m/s2" if is_acceleration else ""
-        found = f"{counted[0]:g}{unit} throughout" if counted[0] else "zeros only"
-        what = "accelerations" if is_acceleration else drive.facts.main.name
-        raise BadInput(f"{drive.file}: expected {what} after the first {past_s:g} s, found {found}")
+    _check_varies(drive, drive.facts.main, drive.accel_z_mps2,
+                  "accelerations" if is_acceleration else drive.facts.main.name)
     check_decay(drive)
     if is_acceleration and counted.std() < QUIETEST_MPS2:
         raise BadInput(f"{drive.file}: expected accelerations in m/s2, found none above {np.abs(counted).max():.2g}")

@@ -250,6 +250,10 @@ def conclusion(found: LabComparison) -> str:
                     "see.")
         return ("The model lacks no effect of the car. The residual (measured - model) does not depend on the road; it "
                 "looks like coloured noise of the sensor or the engine.")
+    if found.unexplained_signals:
+        return ("The model lacks nothing that the first signal shows, but after a refit it leaves more than noise of "
+                f"{enumerated(found.unexplained_signals, 'and')}. Check position, sign and filter there; if they are "
+                "right, something is missing.")
     removed = found.removed.drifting_sensors or found.removed.distance_error_m > 0
     beside = " apart from what was removed (shown below)" * bool(removed)
     return f"The model lacks nothing{beside}: after a refit, the residual (measured - model) is no more than noise."
@@ -272,7 +276,7 @@ def next_step(found: LabComparison) -> str:
         return "Next: check the run's columns, signs and units; then ridelog diagnose with the same arguments."
     if not found.missing:
         on_rig = are_on_rig(found.refitted.residuals.runs)
-        if on_rig and _is_coloured(found):
+        if (on_rig and _is_coloured(found)) or found.unexplained_signals:
             return "Next: ridelog diagnose with the same arguments tries every known effect."
         harder = "Stronger motion or other frequencies" if on_rig else "Rougher roads or other speeds"
         return f"Next: nothing. {harder} would be a stronger test."
@@ -294,7 +298,8 @@ def comparison_json(found: LabComparison) -> dict[str, Any]:
         **lab_words.errors_json(found.steps, found.floor),
         "refitted": {**_standing_json(found.refitted), "error": found.steps[-1].error,
                      "shifts": dict(found.moves), "shifted_far": list(found.far)},
-        "force_gain": found.force_gain, "repeats": None if found.repeats is None else {
+        "force_gain": found.force_gain, "signals_unexplained": list(found.unexplained_signals),
+        "repeats": None if found.repeats is None else {
             "runs": list(found.repeats.names), "deviation_mps2": found.repeats.deviation_mps2},
         "residual_tests": [
             {"name": test.name, "found": test in found.tests_found, "value": known(test.value), "unit": test.unit,
