@@ -1135,6 +1135,16 @@ def test_another_unit_or_sign_of_another_signal_is_said(
         assert "it leaves more than noise of displacement_m." in capsys.readouterr().out.replace("\n", " ")
 
 
+def test_runs_of_which_the_first_signals_have_other_units_are_refused(tmp_path: Path) -> None:
+    bench, push, seen = ringing(6.0)
+    (tmp_path / "bench.yaml").write_text(bench.yaml)
+    runs = [str(written(tmp_path / name, {name: seen[name]}, {"force_n": push(TIME_S)}, BODY))
+            for name in ("accel_z_mps2", "displacement_m")]
+    for verb, more in (("compare", []), ("identify", ["--free", "stiffness_n_per_m"])):
+        with pytest.raises(BadInput, match="expected a column accel_z_mps2, as in .*, found displacement_m first"):
+            main([verb, "--vehicle", str(tmp_path / "bench.yaml"), *runs, *more])
+
+
 def test_a_mass_that_its_base_moves_against_the_force_on_it_is_not_called_upside_down(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bench, push, _ = ringing(6.0)

@@ -720,12 +720,16 @@ def _check_varies(drive: Drive, signal: Signal, samples: Array, said: str) -> No
 
 
 def check_readings(drive: Drive, others: Sequence[Drive]) -> None:
-    """Raise BadInput for a drive of another rate than the others, that recorded nothing, or gravity as well, does not
-    die down, or repeats samples."""
+    """Raise BadInput for a drive of another rate than the others, or whose first signal has another unit, that recorded
+    nothing, or gravity as well, does not die down, or repeats samples."""
     past_s = past_of(drive.track).value
     if others and abs(drive.rate_hz / others[0].rate_hz - 1) > _SAME_RATE:
         raise BadInput(f"{drive.file}: expected {others[0].rate_hz:g} samples a second, as in {others[0].path}, found "
                        f"{drive.rate_hz:g}")
+    main, first = (one.facts.main for one in (drive, (*others, drive)[0]))
+    if main.unit != first.unit:  # errors of all runs are summed
+        raise BadInput(f"{drive.file}: expected a column {first.name}, as in {others[0].path}, found {main.name} "
+                       "first")
     counted = drive.accel_z_mps2[int(past_s * drive.rate_hz):]
     is_acceleration = drive.facts.main.measures == "acceleration"
     _check_varies(drive, drive.facts.main, drive.accel_z_mps2,
