@@ -1141,7 +1141,7 @@ def test_runs_of_which_the_first_signals_have_other_units_are_refused(tmp_path: 
     runs = [str(written(tmp_path / name, {name: seen[name]}, {"force_n": push(TIME_S)}, BODY))
             for name in ("accel_z_mps2", "displacement_m")]
     for verb, more in (("compare", []), ("identify", ["--free", "stiffness_n_per_m"])):
-        with pytest.raises(BadInput, match="expected a column accel_z_mps2, as in .*, found displacement_m first"):
+        with pytest.raises(BadInput, match=r"expected a column accel_z_mps2, as in .*, found displacement_m first"):
             main([verb, "--vehicle", str(tmp_path / "bench.yaml"), *runs, *more])
 
 
