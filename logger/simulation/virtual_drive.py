@@ -16,7 +16,7 @@ What a recorder would see: a car driven over a road, or stood on a rig, with its
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass, replace
@@ -52,14 +52,15 @@ numbers of the state may cancel for a while (a judgement)."""
 
 @dataclass(frozen=True, eq=False)
 class Beginning:
-    """A state (2 n + k,) in which a run begins, as ``Passage.begins``, and how what its signals record changes with it
-    (m, 2 n + k), in so many samples (``count``); the ``usual`` size of each number of the state, 0 of those that are
-    known."""
+    """A state (2 n + k,) in which a run begins, as ``Passage.begins``, and how what its signals record in so many
+    samples (``count``), by their sizes and joined (m,), changes with it (m, 2 n + k); the ``usual`` size of each number
+    of the state, 0 of those that are known; and of a car whose laws are bent what they ``recorded`` (m,)."""
 
     state: Array
     columns: Array
     usual: Array
     count: int
+    recorded: Array | None = None
 
 
 def begins_unknown(car: Car, run: Run) -> bool:
@@ -88,7 +89,7 @@ def beginning(car: Car, passage: Passage, run: Run, recorded: Recorded, near: Be
     passage.under_wheels(passage.driven(car.structure))  # asked for once, for all states
     # What hangs on a car has a state as soon as it weighs something.
     # One cycle is another number of samples of another road.
-    alike = near is not None and near.columns.shape == (len(weighed.measured), count)
+    alike = near is not None and near.columns.shape == (weighed.size, count)
     if near is not None and alike and car.bends_laws and len(weighed.measured):
         return _bent_beginning(car, passage, weighed, near, is_near=True)
     plain = _linear_beginning(car, passage, weighed, count)
@@ -100,7 +101,7 @@ def beginning(car: Car, passage: Passage, run: Run, recorded: Recorded, near: Be
 def _linear_beginning(car: Car, passage: Passage, weighed: _WeighedRecord, count: int) -> Beginning:
     """The beginning (``count``) of the car without its laws, whose record is linear in it."""
     wanted, plain, moves = weighed.measured, car.linear, 2 * len(car.structure.mass)
-    columns, state, usual = np.zeros((len(wanted), count)), np.zeros(count), np.ones(count)
+    columns, state, usual = np.zeros((weighed.size, count)), np.zeros(count), np.ones(count)
     samples = weighed.run.count
     if car.structure.held or not len(wanted):
         usual[:moves] = 0.0  # the bench moves it
@@ -108,35 +109,35 @@ def _linear_beginning(car: Car, passage: Passage, weighed: _WeighedRecord, count
     still = weighed.whole(plain, passage)
     # Small, as records are clipped at what no sensor reads: 1 m is that of what is let go at 160 Hz.
     small = [weighed.whole(plain, passage.begun_with(one)) - still for one in _SMALL_STATE * np.eye(moves)]
-    columns[:, :moves] = np.stack([weighed.counted(one) for one in small], axis=1) / _SMALL_STATE
-    seen = np.array([np.abs(one).max() for one in small]) / _SMALL_STATE
+    columns[:, :moves] = np.stack(small, axis=1) / _SMALL_STATE
+    seen = np.abs(columns[:, :moves]).max(axis=0)
     usual[:moves] = np.divide(_WIDE * weighed.largest, seen, out=np.zeros_like(seen), where=seen > 0)
-    left = wanted - weighed.counted(still)
+    left, counted = wanted - weighed.counted(still), weighed.counted(columns)
     for _ in range(_PRIOR_ROUNDS):  # the prior weighs as much as the noise that is left allows
-        state = state + _towards(columns, left - columns @ state, usual, state)
+        state = state + _towards(counted, left - counted @ state, usual, state)
     return Beginning(state, columns, usual, samples)
 
 
 def _bent_beginning(car: Car, passage: Passage, weighed: _WeighedRecord, start: Beginning, is_near: bool) -> Beginning:
     """The beginning with a car whose laws are bent, by steps whose first derivatives are those of one that ``is_near``.
-    """
+    The last step is not simulated: what is small of it to second order is less than it may gain."""
     state, columns, usual, own = start.state, start.columns.copy(), start.usual, is_near
     per_usual = np.divide(1.0, usual, out=np.zeros_like(usual), where=usual > 0)
-    here = weighed.of(car, passage.begun_with(state))
+    here = weighed.whole(car, passage.begun_with(state))
     for _ in range(_MOST_STATE_STEPS):
         if fresh := not own:
             for index, one in enumerate(_STATE_STEP * usual):
                 if one > 0:
                     beside = passage.begun_with(state + one * (np.arange(len(usual)) == index))
-                    columns[:, index] = (weighed.of(car, beside) - here) / one
+                    columns[:, index] = (weighed.whole(car, beside) - here) / one
             own = True
-        way = _towards(columns, weighed.measured - here, usual, state)
-        least, gained = weighed.misfit(here, state * per_usual), 0.0
-        if weighed.misfit(here + columns @ way, (state + way) * per_usual) > least - _SMALL_GAIN:
-            return replace(start, state=state + way, columns=columns)
+        way = _towards(weighed.counted(columns), weighed.measured - weighed.counted(here), usual, state)
+        least, gained, ahead = weighed.misfit(here, state * per_usual), 0.0, here + columns @ way
+        if weighed.misfit(ahead, (state + way) * per_usual) > least - _SMALL_GAIN:
+            return replace(start, state=state + way, columns=columns, recorded=weighed.in_units(ahead))
         for share in (1.0, 0.5, 0.25, 0.1, 0.02) if fresh else (1.0,):
             step = share * way
-            there = weighed.of(car, passage.begun_with(state + step))
+            there = weighed.whole(car, passage.begun_with(state + step))
             gained = least - weighed.misfit(there, (state + step) * per_usual)
             if gained > 0:
                 break
@@ -147,7 +148,7 @@ def _bent_beginning(car: Car, passage: Passage, weighed: _WeighedRecord, start: 
         if (fresh or is_near) and gained < _SMALL_GAIN:
             break
         own = gained > 0
-    return replace(start, state=state, columns=columns)
+    return replace(start, state=state, columns=columns, recorded=weighed.in_units(here))
 
 
 def _shown_in(car: Car, passage: Passage, run: Run, numbers: int) -> int:
@@ -187,27 +188,29 @@ class _WeighedRecord:
         self._sizes[self._sizes == 0] = 1.0
         whole = measured[:, read] / self._sizes
         self.largest = float(np.abs(whole - whole.mean(axis=1, keepdims=True)).max(initial=0.0))
-        self.measured = self.counted(measured / self._sizes)
-
-    def of(self, car: Car, begun: Passage) -> Array:
-        """What a car would have read in their place."""
-        return self.counted(self.whole(car, begun))
+        self.size = measured.size
+        self.measured = self.counted((measured / self._sizes).ravel())
 
     def whole(self, car: Car, begun: Passage) -> Array:
-        """The same of all samples (1 + s, n), with their means."""
+        """What a car would have read in their place: all samples, with their means."""
         joined = self.run.in_band(self._recorded(car, begun, self.run))
-        return np.asarray(joined.reshape(-1, self.run.count) / self._sizes)
+        return np.asarray(joined.reshape(-1, self.run.count) / self._sizes).ravel()
+
+    def in_units(self, whole: Array) -> Array:
+        """Whole signals in the units of the record."""
+        return np.asarray(whole.reshape(-1, self.run.count) * self._sizes).ravel()
 
     def counted(self, whole: Array) -> Array:
-        """What counts of whole signals (1 + s, n), joined (m,)."""
-        samples = whole[:, self._counted]
-        return np.asarray(samples - samples.mean(axis=1, keepdims=True)).ravel() if samples.size else np.empty(0)
+        """What counts of whole signals (m,), or of columns of these (m, c), without their means."""
+        samples = whole.reshape(-1, self.run.count, *whole.shape[1:])[:, self._counted]
+        samples = samples - samples.mean(axis=1, keepdims=True) if samples.size else samples
+        return np.asarray(samples.reshape(-1, *whole.shape[1:]))
 
-    def misfit(self, predicted: Array, numbers: Array) -> float:
-        """Minus twice the log-likelihood of what was predicted (m,), with noise of any level, and of the numbers (c,)
-        of a state over their usual sizes."""
-        squares = np.sum((self.measured - predicted) ** 2) + np.finfo(float).tiny
-        return len(predicted) * float(np.log(squares)) + float(numbers @ numbers)
+    def misfit(self, whole: Array, numbers: Array) -> float:
+        """Minus twice the log-likelihood of whole signals (m,) that were predicted, with noise of any level, and of the
+        numbers (c,) of a state over their usual sizes."""
+        squares = np.sum((self.measured - self.counted(whole)) ** 2) + np.finfo(float).tiny
+        return len(self.measured) * float(np.log(squares)) + float(numbers @ numbers)
 
 
 _MOST_TRIES = 200
@@ -289,7 +292,9 @@ def recorded_distance(car: Car, distance_m: Array) -> Array:
 _KEPT_PASSAGES, _KEPT_STEPS = 6, 400_000
 """Of each run so many passages are kept, of so many steps in all. Places under wheels take some 80 bytes a step, and a
 quarter of the time that stepping takes."""
-_STEPPERS = 2
+_STEPPERS, _WORTH_HANDING_OVER = 2, 40_000
+"""Threads that step runs, where each has so many steps: to hand one over takes 0.2 ms of a processor (measured), a
+twentieth of what these take."""
 _HOP_HZ = 13.0  # of a car's wheels
 _MOST_FINER = 16
 _LEAST_DAMPING = 1e-3
@@ -320,7 +325,7 @@ def steps_hz(vehicle: Vehicle) -> float:
 
 class SimulatedRuns:
     """Runs, and predictions of them in at least so many steps a second. Threads may ask at the same time; cars with
-    laws of their own are stepped in two threads besides.
+    laws of their own are stepped in two threads besides, where their runs are long.
 
     Problem: a fit needs hundreds of predictions of the same runs, by cars that differ in a number or an effect.
     Solution: ``SimulatedRuns`` caches the road under the wheels of each run (``Passage``), also for the few other
@@ -365,14 +370,17 @@ class SimulatedRuns:
                             the car without its laws, near enough to rank cars
         """
         with np.errstate(over="ignore", invalid="ignore"):
-            passages = self._passages_of(car, distance_error_m, rough, tracks, near)
-            steps = car.bends_laws or car.structure.held
-            for step_s, forces in {(one.step_s, one.forces) for one in passages if steps}:
+            passages, known = self._passages_of(car, distance_error_m, rough, tracks, near)
+            in_threads = car.bends_laws and len(passages) > 1 and all(
+                len(one.way.distance_m) > _WORTH_HANDING_OVER for one in passages)
+            for step_s, forces in {(one.step_s, one.forces) for one in passages if in_threads}:
                 stepper_of(car, step_s, forces)  # made once, before both threads ask for it
         self._work.append(35_000)
-        each: Iterable[Array] = (self._steppers.map if car.bends_laws and len(passages) > 1 else map)(
-            partial(self._recorded, car), passages, self.runs)
-        return [run.in_band(one) for run, one in zip(self.runs, each, strict=True)]
+
+        def record(passage: Passage, run: Run, recorded: Array | None) -> Array:
+            return run.in_band(self._recorded(car, passage, run)) if recorded is None else recorded
+
+        return [*(self._steppers.map if in_threads else map)(record, passages, self.runs, known)]
 
     def linear_slopes(self, car_with: Callable[[Array], Car], here: Array,
                       distance_error_m: Sequence[Array] | None = None) -> tuple[list[int], list[Array]]:
@@ -394,7 +402,7 @@ class SimulatedRuns:
     def respond(self, car: Car, distance_error_m: Sequence[Array] | None = None) -> list[Response]:
         """The response of the car in each run: its record, and the motions of suspensions and tires."""
         with np.errstate(over="ignore", invalid="ignore"):
-            return [respond(car, passage) for passage in self._passages_of(car, distance_error_m)]
+            return [respond(car, passage) for passage in self._passages_of(car, distance_error_m)[0]]
 
     def roads(self, car: Car, distance_error_m: Sequence[Array], tracks: Sequence[WheelTracks]) -> list[Array]:
         """Vertical acceleration of the road under the wheels (n, w) in each run [m/s2], as the recorder would keep it;
@@ -415,19 +423,23 @@ class SimulatedRuns:
 
     def _passages_of(self, car: Car, distance_error_m: Sequence[Array] | None, rough: bool = False,
                      tracks: Sequence[WheelTracks] | None = None, near: Sequence[Beginning | None] | None = None
-                     ) -> list[Passage]:
+                     ) -> tuple[list[Passage], list[Array | None]]:
+        """The passages, begun, and the records of those that were simulated, or as good as, to find how they begin."""
         passages = self._unbegun(car, distance_error_m, rough, tracks)
-        if not any(begins_unknown(car, run) for run in self.runs):
-            return passages
-        if near is not None and not near and all(run.past is Past.DRIVEN for run in self.runs):
-            return [passage.begun_with(beginning(car, passage, run, self._recorded, is_bent=False).state)
-                    if begins_unknown(car, run) else passage for run, passage in zip(self.runs, passages, strict=True)]
-        known = near or self.beginnings(car, distance_error_m)
+        unknown = [begins_unknown(car, run) for run in self.runs]
+        if not any(unknown):
+            return passages, [None] * len(passages)
+        linear = near is not None and not near and all(run.past is Past.DRIVEN for run in self.runs)
+        known = [None] * len(passages) if linear else near or self.beginnings(car, distance_error_m)
         alike = [near is None and one is passage for one, passage in zip(
             self._unbegun(car, distance_error_m, rough=True), passages, strict=True)]
-        return [passage if not begins_unknown(car, run) else passage.begun_with((
-            one if one is not None and same else beginning(car, passage, run, self._recorded, one)).state)
-                for run, passage, one, same in zip(self.runs, passages, known, alike, strict=True)]
+        found = [None if not of_run else one if one is not None and same else
+                 beginning(car, passage, run, self._recorded, one, is_bent=not linear)
+                 for run, passage, of_run, one, same in zip(self.runs, passages, unknown, known, alike, strict=True)]
+        return ([passage if one is None else passage.begun_with(one.state)
+                 for passage, one in zip(passages, found, strict=True)],
+                [None if one is None or one.count < run.count else one.recorded
+                 for run, one in zip(self.runs, found, strict=True)])
 
     def _unbegun(self, car: Car, distance_error_m: Sequence[Array] | None, rough: bool,
                  tracks: Sequence[WheelTracks] | None = None) -> list[Passage]:

@@ -16,7 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -118,10 +118,11 @@ class Stepper:
         structure, n = self.structure, len(self.structure.mass)
         around = np.concatenate([2 * elevation[:1] - mean[:1], mean, 2 * elevation[-1:] - mean[-1:]])
         first = begun(structure.at_rest(elevation[0]), begins)
-        stands = Way(np.zeros(len(elevation)), np.arange(0.0, len(elevation)) * self.step_s)
+        if way is None:
+            way = Way(np.zeros(len(elevation)), np.arange(0.0, len(elevation)) * self.step_s)
         return Motion(*steps(
             self.by_known, self.by_force, self.step_s, *self.tabulated, self.rubs, self.rubs_at,
-            _asked(structure, self.laws, way or stands, begins[2 * n:]),
+            _asked(structure, self.laws, way, begins[2 * n:]),
             self.state_and_seen @ first + self.inputs_seen @ elevation[0], 2 * n, around, elevation))
 
 
@@ -227,8 +228,7 @@ def _tabulated(structure: Structure, laws: Sequence[CornerLaws], step_s: float) 
     variables, and numbers."""
     from logger.vehicle.stepping_loop import RATE_MPS, TRAVEL_M
 
-    travel = np.linspace(-TRAVEL_M, TRAVEL_M, _POINTS)
-    rate = np.linspace(-RATE_MPS, RATE_MPS, _POINTS)
+    travel, rate = _even(TRAVEL_M), _even(RATE_MPS)
     loads = static_tire_loads_n(structure)
     tables, pairs, numbers = np.zeros((4, len(laws), _POINTS)), [], []
     paired = any(one.others for one in laws)
@@ -246,6 +246,12 @@ def _tabulated(structure: Structure, laws: Sequence[CornerLaws], step_s: float) 
                         one.mount_n_per_m if mounted else 0.0, low, 1 / step, one.damping_n_s_per_m, structure.tires[i],
                         one.tire_damping_n_s_per_m, np.inf if one.tire_pulls else loads[i], one.mount_play_m])
     return tables, np.array(pairs), np.array(numbers, dtype=float)
+
+
+@cache
+def _even(reach: float) -> Array:
+    """Where a table of one variable has its points (``_POINTS``,), from minus to plus a reach."""
+    return np.linspace(-reach, reach, _POINTS)
 
 
 def _mount(laws: CornerLaws, rate: Array, step_s: float) -> tuple[Array, float, float]:

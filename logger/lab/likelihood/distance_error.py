@@ -329,10 +329,15 @@ class RigRecordError(RecordError):
     def distance_error_m(self, k: Array) -> Array:
         return np.zeros(self.run.count)
 
+    @cached_property
+    def _clock(self) -> Array:
+        """By how much each sample is early, of a clock and a lag of 1 (2, n) or (1, n)."""
+        return np.asarray(self.basis.toarray())  # asked for with each prediction
+
     def with_recorder_error(self, prediction: Array, k: Array) -> Array:
         """As of ``RecordError``."""
         if k[: self.places].any():
-            late_s = -(self.basis.T @ k[: self.places])
+            late_s = -(k[: self.places] @ self._clock)
             prediction = np.concatenate([_later(one, late_s, self.run.rate_hz)
                                          for one in prediction.reshape(-1, self.run.count)])
         return super().with_recorder_error(prediction, k)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
@@ -74,6 +74,7 @@ class Posterior:
         self.size_mps2 = float(np.sqrt((counted**2).mean()))
         self.freedom = float(sum(one.freedom.sum() for one in self.bands))
         self._inputs: dict[tuple[float, float], list[WheelTracks]] = {}
+        self._predicted: dict[Hashable, list[Array]] = {}
 
     @property
     def shows_forces(self) -> bool:
@@ -136,10 +137,21 @@ class Posterior:
 
     def predict(self, effects: Sequence[Chosen], logs: Array, record: Sequence[Array], rough: bool = False,
                 near: Sequence[Beginning | None] | None = None) -> list[Array]:
-        """Predicted record of each run (n,); arguments as of ``SimulatedRuns.predict``."""
-        predictions = self.runs.predict(self.car(effects, logs), self.distance_error_m(record), rough, near=near)
-        return [one.with_recorder_error(prediction, k) for one, prediction, k in zip(
-            self.record_errors, predictions, record, strict=True)]
+        """Predicted record of each run (n,); arguments as of ``SimulatedRuns.predict``. Those of the cars that were
+        asked for last are kept, as many as a set of derivatives takes: a fit asks for the one that it is at for its
+        fine and rough record, its cost, and each such set."""
+        key = (self.runs, *((one.effect, *one.values.items()) for one in effects), logs.tobytes(),
+               *(k.tobytes() for k in record), rough, near if near is None else tuple(near))
+        known = dict(self._predicted)
+        if (found := known.pop(key, None)) is None:
+            predictions = self.runs.predict(self.car(effects, logs), self.distance_error_m(record), rough, near=near)
+            found = [one.with_recorder_error(prediction, k) for one, prediction, k in zip(
+                self.record_errors, predictions, record, strict=True)]
+            if len(known) > len(logs) + sum(len(one.values) for one in effects):
+                del known[next(iter(known))]
+        known[key] = found
+        self._predicted = known
+        return list(found)
 
     def beginnings(self, effects: Sequence[Chosen], logs: Array, record: Sequence[Array]) -> list[Beginning | None]:
         """How the runs begin, by a rough simulation, whose initial state nobody knows; None of the others."""

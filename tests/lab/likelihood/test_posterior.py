@@ -27,6 +27,19 @@ def test_near_a_state_rough_simulations_are_corrected_by_what_they_lack_there() 
         np.testing.assert_allclose(one, fine, atol=1e-9)
 
 
+def test_what_was_just_predicted_is_not_simulated_again_and_what_differs_is() -> None:
+    posterior = posterior_of(secret_runs(lasts_s=6.0))
+    state, runs = posterior.start([hidden("tire_damping", tire_damping_n_s_per_m=300.0)]), posterior.runs
+    simulated = runs.work
+    np.testing.assert_array_equal(posterior.predict(state.effects, state.logs, state.record), state.predictions)
+    assert runs.work == simulated
+    other = [hidden("tire_damping", tire_damping_n_s_per_m=400.0)], state.logs, state.record
+    drawn = state.effects, state.logs + 0.1, state.record
+    for one in (posterior.predict(*other), posterior.predict(*drawn),
+                posterior.simulated(2 * FINE_HZ).predict(state.effects, state.logs, state.record)):
+        assert not np.array_equal(one, state.predictions)
+
+
 @pytest.mark.parametrize(("effect", "values"), [
     ("damper_asymmetry", {"rebound_to_bump_ratio": 2.0}), ("tire_damping", {"tire_damping_n_s_per_m": 300.0}),
     ("top_mount_compliance", {}), ("progressive_spring", {"cubic_stiffness_n_per_m3": 3e6}), ("payload", {})])
