@@ -288,10 +288,11 @@ def _look_through(one: Parameter) -> None:
         raise ValueError(f"{one.name}: expected finite low <= start <= high, found {one.low}, {one.start}, {one.high}")
     if one.scale is not Scale.LINEAR and one.low <= 0:
         raise ValueError(f"{one.name}: expected low above 0 for a scale that is {one.scale.value}, found {one.low}")
-    if one.null is not None and not (isinstance(one.null, Real) and (
-            one.low <= one.null <= one.high or np.isinf(one.null))):
+    null: object = one.null
+    if null is not None and not (isinstance(null, Real) and (
+            one.low <= float(null) <= one.high or np.isinf(float(null)))):
         raise ValueError(f"{one.name}: expected null to be None, infinite, or within {one.low} to {one.high}, "
-                         f"found {one.null!r}")
+                         f"found {null!r}")
     if one.step is not None and not 0 < one.step < float("inf"):
         raise ValueError(f"{one.name}: expected a step above 0, found {one.step}")
     if not isinstance(one.trials, tuple) or not one.trials:
