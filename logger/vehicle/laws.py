@@ -60,7 +60,7 @@ class Seen(NamedTuple):
     memory: tuple[Any, ...]
 
 
-MOST_MEMORY = 2
+MOST_MEMORY = 4
 """States that a law may have."""
 
 

@@ -44,7 +44,8 @@ else:
 MEMORY_AT = len(Seen._fields) - 1
 """Where a law's states stand in what it feels: after all else that it sees."""
 FELT = MEMORY_AT + MOST_MEMORY
-"""Numbers that a law may feel."""
+"""Numbers that a law may feel: 14. Machine code holds it, and is kept on disk for as long as this file's text stays the
+same: whoever changes ``MOST_MEMORY`` changes the number here."""
 ANSWERS = MOST_MEMORY
 """Numbers that it answers with: the force, or how fast its states grow."""
 

@@ -490,8 +490,8 @@ def test_the_corners_of_a_half_car_take_them() -> None:
     ("def pull(p, seen):\n    return 1.0\n", "'wheel', pull, p", "expected with_law to get one of Between.BODY_AND_WH"),
     ("def pull(p, seen):\n    return 1.0\n", "Between.BODY_AND_WHEEL, pull, p, memory=(0.0,)",
      "expected rates and memory both, or neither"),
-    ("def pull(p, seen):\n    return 1.0\n", "Between.BODY_AND_WHEEL, pull, p, pull, (0.0, 0.0, 0.0)",
-     "a tuple of at most 2 finite numbers"),
+    ("def pull(p, seen):\n    return 1.0\n", "Between.BODY_AND_WHEEL, pull, p, pull, (0.0,) * 5",
+     "a tuple of at most 4 finite numbers"),
     ("def pull(p, seen):\n    return 1.0\n", "Between.BODY_AND_WHEEL, pull, p, pull, (0.0,)",
      "rates to return a tuple of 1, one number for each state, as in (rate,), found 1.0"),
 ])
@@ -547,3 +547,8 @@ def test_which_a_search_tries_unasked() -> None:
     assert among(known_effects(model, [])[0], ["hysteresis", "dry_friction"]).keys() == {"dry_friction", "hysteresis"}
     with pytest.raises(BadInput, match="no effect 'stiction'"):
         among({}, ["stiction"])
+
+
+def test_the_loop_says_how_long_its_arrays_are() -> None:
+    """Machine code is kept by the loop's text alone: with other lengths the text has to be another, too."""
+    assert f"feel: {stepping_loop.FELT}." in Path(stepping_loop.__file__).read_text("utf-8")

@@ -62,7 +62,8 @@ def _loops(draft: Draft, found: Chosen, context: LawContext) -> Curves | None:
             return Seen._make([way_m * np.sin(turn * t), way_m * turn * np.cos(turn * t), *still, tuple(memory)])
 
         travel, rate = np.array([seen(t, ())[:2] for t in time_s]).T
-        force = sum((one(travel, rate) for one in laws.others), laws.friction_n(rate))
+        force = sum((one(travel) for one in laws.springs), laws.friction_n(rate))
+        force = sum((one(travel, rate) for one in laws.others), force)
         for law in laws.motions:
             force += [law.force(law.p, seen(t, states))
                       for t, states in zip(time_s, _remembered(law, seen, time_s), strict=True)]
