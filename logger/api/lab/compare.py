@@ -200,8 +200,8 @@ def headline(found: LabComparison) -> list[str]:
         lines.append(f"{refit} lowers it to {after:.3f} and removes {1 - (after / before)**2:.0%} of the residual's "
                      "power.")
     else:
-        lines.append(f"{refit} {'raises it to' if after > before / _HELPS else 'leaves it at'} {after:.3f}: small "
-                     "errors in the parameters are not the cause.")
+        cause = ": small errors in the parameters are not the cause" * (before > (1 + UNEXPLAINED) * found.floor)
+        lines.append(f"{refit} {'raises it to' if after > before / _HELPS else 'leaves it at'} {after:.3f}{cause}.")
     # What a model lacks is in its residual, and so in the noise that is estimated from that.
     lines += lab_words.error_words(found.steps, found.floor, about="at most" if found.missing else "about")
     lines += signal_errors({name: (error, refitted.signals[name]) for name, error in plain.signals.items()},
