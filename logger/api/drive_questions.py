@@ -314,7 +314,8 @@ class SimulateQuestion(question.Question):
     name: Annotated[str, "of the run; each of several needs its own"] = "simulated"
     excitation: Annotated[Path | None, question.Option(
         "for a test rig, in place of --profile and --speed: what drives it over time, as CSV (t_s and any of "
-        "elevation_m, elevation_rear_m and forces, which a run.yaml beside it places)", metavar="FILE", read=Path)] = None
+        "elevation_m, elevation_rear_m and forces, which a run.yaml beside it places)", metavar="FILE",
+        read=Path)] = None
     effects: Annotated[Sequence[str], question.Option(
         "a physical effect, or the path of a Python file with one of your own; may repeat. Parameters that you do not "
         "give have their usual values. It replaces the vehicle's own effect of that "
