@@ -167,6 +167,20 @@ def deviance(bands: Sequence[JointBands], residuals: Sequence[Array]) -> float:
     return sum(one.deviance(residual) for one, residual in zip(bands, residuals, strict=True))
 
 
+def deviance_standard_error(bands: Sequence[JointBands], residuals: Sequence[Array], others: Sequence[Array]) -> float:
+    """Standard error of the difference of the deviances of two models of some runs, by their residuals (n,) per run.
+
+    A likelihood takes the lines of a spectrum for so many independent witnesses. Where neither model is right they are
+    not: what both leave may stand in a few lines near one tone, and two models that differ there alone differ by much
+    in a likelihood. So the difference is judged by how the parts of its lines scatter (Q. H. Vuong, Econometrica 57,
+    1989, for models of which neither holds the other)."""
+    variance = 0.0
+    for one, left, right in zip(bands, residuals, others, strict=True):
+        parts = one.whitener(right).line_deviances(right) - one.whitener(left).line_deviances(left)
+        variance += len(parts) * float(parts.var())
+    return float(np.sqrt(variance))
+
+
 class JointBands:
     """The bands (b,) of all signals of one run. Methods as of ``Bands``, of the signals joined."""
 
@@ -219,6 +233,10 @@ class JointWhitener:
         n = rows.shape[1] // len(self.each)
         return sum((one.products(rows[:, place * n : (place + 1) * n]) for place, one in enumerate(self.each)),
                    np.zeros((rows.shape[0], rows.shape[0])))
+
+    def line_deviances(self, samples: Array) -> Array:
+        parts = np.split(samples, len(self.each), axis=-1)
+        return np.concatenate([one.line_deviances(part) for one, part in zip(self.each, parts, strict=True)])
 
     def adjoint(self, white: Array) -> Array:
         kept = np.cumsum([one.kept for one in self.each])[:-1]

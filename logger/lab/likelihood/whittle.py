@@ -196,6 +196,11 @@ class Whitener:
         that count, in units of the noise, without the frequencies outside of all bands."""
         return (self._spectrum(samples) * (self._sides * self._gain)).view(float)
 
+    def line_deviances(self, samples: Array) -> Array:
+        """Minus twice the log-likelihood of each line of the spectrum (kept / 2,) of samples (n,), whole, at its level;
+        without its constant."""
+        return (self(samples)**2).reshape(-1, 2).sum(axis=1) - 4 * np.log(self._gain)
+
     def adjoint(self, white: Array) -> Array:
         """Samples (..., n), whole, whose products with other samples are those of numbers (..., kept) with these
         whitened."""

@@ -20,6 +20,7 @@ from logger.lab.likelihood.linear_model import LinearModel
 from logger.lab.likelihood.map_fit import align, fit, fit_to_the_end
 from logger.lab.likelihood.noise_floor import excess_by_signal, is_within_discrepancy
 from logger.lab.likelihood.posterior import NotSimulated, Posterior
+from logger.lab.likelihood.signals import deviance_standard_error
 from logger.lab.likelihood.whittle import UNEXPLAINED
 from logger.lab.residuals.unexplained import is_coloured_noise
 from logger.lab.selection.candidate_fit import CandidateFit, chance_of, fit_roughly, refine, reshaped, with_refinements
@@ -165,6 +166,10 @@ class Likelihood(Protocol[M, P, F]):
     def is_doubtful(self, base: M, one: F) -> bool:
         """Whether a fit is at an end of its range, beyond what the records show, or predicts no better."""
 
+    def gain_uncertainty(self, one: M | F, other: F) -> float:
+        """How far the difference of two models' gains may be off, by what the records themselves say of it."""
+        return 0.0
+
     def leaves_noise(self, there: M | F) -> bool:
         """Whether what is left is noise though it is louder than expected."""
         return False
@@ -261,6 +266,11 @@ class MeasuredRoad:
         return is_outside_data(base.posterior, one.chosen) or (base.on_rig and (
             one.hold_out.is_worse_than(base.hold_out)
             or is_within_discrepancy(base.posterior, base.state, one.state)))
+
+    def gain_uncertainty(self, one: Baseline | CandidateFit, other: CandidateFit) -> float:
+        """Two standard errors of the difference of their deviances."""
+        left, right = (each.posterior.residuals(each.state) for each in (one, other))
+        return 2 * deviance_standard_error(one.posterior.bands, left, right)
 
     def leaves_noise(self, there: Baseline | CandidateFit) -> bool:
         """Whether what is left is noise of a colour."""
@@ -440,7 +450,7 @@ class Search(Generic[M, P, F]):
                 now = other
                 continue
             self.progress(f"{best.effect.name} is missing; fitting the model with it")
-            self._rivals[best.effect.name] = self._rivals_of(now, best.gain, best.effect.name, tried)
+            self._rivals[best.effect.name] = self._rivals_of(now, best, best.gain, best.effect.name, tried)
             there = self._in_range(self._reconsider(
                 before, grown or self.likelihood.with_effect(best), best.effect.name, now), now)
             if there is None:
@@ -736,7 +746,7 @@ class Search(Generic[M, P, F]):
             name = best.effect.name
         elif added_to is not None:
             return now
-        self._rivals[name] = (*alike, *self._rivals_of(without, gain, name, tried))
+        self._rivals[name] = (*alike, *self._rivals_of(without, now, gain, name, tried))
         return now
 
     def _all_reconsidered(self, before: M, now: M, names: Sequence[str]) -> M:
@@ -746,10 +756,10 @@ class Search(Generic[M, P, F]):
             now = self._reconsider(before, now, name)
         return now
 
-    def _rivals_of(self, without: M, gain: float, name: str, tried: SearchRound[P, F]) -> tuple[str, ...]:
-        """Names of other effects that cannot be distinguished from one that gains so much."""
-        return tuple(one.effect.name for one in tried.fits
-                     if one.effect.name != name and abs(one.gain - gain) < INDISTINGUISHABLE
+    def _rivals_of(self, without: M, there: M | F, gain: float, name: str, tried: SearchRound[P, F]) -> tuple[str, ...]:
+        """Names of other effects that cannot be distinguished from one (``there``) that gains so much."""
+        return tuple(one.effect.name for one in tried.fits if one.effect.name != name
+                     and abs(one.gain - gain) < max(INDISTINGUISHABLE, self.likelihood.gain_uncertainty(there, one))
                      and not self.likelihood.is_doubtful(without, one))
 
     def eliminate_backward(self, before: M, now: M) -> tuple[M, dict[str, float]]:

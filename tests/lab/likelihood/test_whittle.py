@@ -12,7 +12,7 @@ from scipy.linalg import solve_toeplitz
 from scipy.signal import welch
 from scipy.sparse import csr_array, vstack
 
-from logger.lab.likelihood.signals import deviance
+from logger.lab.likelihood.signals import bands_of, deviance, deviance_standard_error
 from logger.lab.likelihood.whittle import DISCREPANCY, Bands
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
@@ -228,3 +228,29 @@ def test_products_of_whitened_samples_are_the_same_both_ways_also_of_a_force_tha
     seen = whitener(5.0 + coloured(1500, 4))
     assert whitener(samples) @ seen == pytest.approx(samples @ whitener.adjoint(seen[None])[0], rel=1e-9)
     assert (whitener.in_time(samples)**2).sum() == pytest.approx((whitener(samples)**2).sum(), rel=0.05)
+
+
+@pytest.mark.parametrize("lines", [None, 6])
+@pytest.mark.parametrize("on_rig", [False, True])
+def test_the_standard_error_of_a_difference_of_deviances_is_how_it_scatters_from_draw_to_draw(
+        on_rig: bool, lines: int | None) -> None:
+    """Two models that leave as much besides the noise: at all frequencies, or in a few lines, where lines that are
+    taken for so many witnesses would say that the difference is certain."""
+    rng, samples = np.random.default_rng(5), 2400
+    run = run_of(samples, measured=np.sin(np.arange(samples)))
+    bands = [bands_of(replace(run, track=Excitation(100.0, np.zeros(samples))) if on_rig else run)]
+
+    def disturbance() -> Array:
+        if lines is None:
+            return rng.normal(0, NOISE, samples)
+        spectrum = np.zeros(samples // 2 + 1, complex)
+        spectrum[rng.choice(np.arange(60, 800), lines)] = rng.normal(0, 1, (lines, 2)) @ (1, 1j)
+        return np.fft.irfft(spectrum, samples) * samples * NOISE / np.sqrt(lines)
+
+    differences, errors = [], []
+    for _ in range(200):
+        noise = rng.normal(0, NOISE, samples)
+        one, other = ([noise + disturbance()] for _ in range(2))
+        differences.append(deviance(bands, other) - deviance(bands, one))
+        errors.append(deviance_standard_error(bands, one, other))
+    assert np.sqrt(np.mean(np.square(errors))) == pytest.approx(np.std(differences), rel=0.2)
