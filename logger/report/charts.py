@@ -11,6 +11,7 @@ from io import BytesIO
 from itertools import pairwise
 from math import ceil, floor, log10
 from pathlib import Path
+from textwrap import wrap
 from typing import Any
 
 import numpy as np
@@ -185,7 +186,8 @@ def _curves(one: Curves) -> list[Html]:
     names = [line.name for line, _ in series]
     if any(line.faint for line, _ in pairs):
         # In the lower left corner, where faint lines have their names at the right.
-        return parts + _keys(names, _CHART.left + 14, _CHART.bottom_px - _KEY_PX * len(names))
+        x = _CHART.left + 14
+        return parts + _keys(names, x, _CHART.bottom_px - _key_height_px(names, x))
     return parts + _key(names, below_px)
 
 
@@ -232,14 +234,27 @@ def _dot(x: float, y: float, radius: int, colour: int) -> Html:
 
 def _key(names: list[str], below_px: float | None) -> list[Html]:
     """What the lines are, at the right; out of the way of a level's name."""
-    at_the_top = below_px is None or below_px >= _CHART.height / 2
-    top = _CHART.top + 10 if at_the_top else _CHART.bottom_px - _KEY_PX * len(names)
-    return _keys(names, _CHART.right_px + 6, top)
+    at_the_top, x = below_px is None or below_px >= _CHART.height / 2, _CHART.right_px + 6
+    return _keys(names, x, _CHART.top + 10 if at_the_top else _CHART.bottom_px - _key_height_px(names, x))
+
+
+def _rows(name: str, x: int) -> list[str]:
+    """A name in rows that end within the chart."""
+    return wrap(name, int((WIDTH - x - 20) / _LETTER_PX))
+
+
+def _key_height_px(names: list[str], x: int) -> int:
+    return _KEY_PX * sum(len(_rows(name, x)) for name in names)
 
 
 def _keys(names: list[str], x: int, top: int) -> list[Html]:
-    return [html('<path class="thick s{}" d="M{} {}h14"/>', SERIES[number % len(SERIES)], x, top + _KEY_PX * number)
-            + _words(x + 20, top + _KEY_PX * number + 4, name) for number, name in enumerate(names)]
+    parts = list[Html]()
+    for number, name in enumerate(names):
+        parts.append(html('<path class="thick s{}" d="M{} {}h14"/>', SERIES[number % len(SERIES)], x, top))
+        for row in _rows(name, x):
+            parts.append(_words(x + 20, top + 4, row))
+            top += _KEY_PX
+    return parts
 
 
 def _field(one: Field) -> list[Html]:

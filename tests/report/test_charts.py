@@ -47,3 +47,15 @@ def test_bars_are_as_long_as_their_values_and_the_level_is_drawn_through_them() 
     assert wide[0] == pytest.approx(2 * wide[1], abs=0.2) == pytest.approx(4 * wide[2], abs=0.5)
     assert left + wide[2] == pytest.approx(level, abs=0.2)
     assert "as it &lt;is&gt;" in drawn and "with a &amp; b" in drawn and "noise alone" in drawn
+
+
+def test_a_long_name_of_a_line_ends_within_the_chart() -> None:
+    """At 7 units a letter, beside where it begins."""
+    x = np.arange(3.0)
+    names = "guesses for what the vehicle's file leaves unknown", "refitted"
+    drawn = chart(Curves("Force", "velocity", "force", tuple(Line(name, x, x) for name in names)))
+    words = [(float(at), float(y), said) for at, y, said in re.findall(
+        r'<text[^>]* x="([\d.]+)" y="([\d.]+)"[^>]*>([^<]+)</text>', drawn) if float(at) > 800]
+    key = [one for one in words if one[0] == max(at for at, _, _ in words)]
+    assert " ".join(said for _, _, said in key).replace("&#x27;", "'").replace("&#39;", "'") == " ".join(names)
+    assert all(at + 7 * len(said) <= 1000 for at, _, said in key) and len({y for _, y, _ in key}) == len(key) > 2

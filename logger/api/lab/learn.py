@@ -205,7 +205,8 @@ def law_blocks(learned: LearnedModel) -> Iterator[Block]:
     yield from sentences(found.law, addition)
     if learned.part is not None:
         yield from bench_sections(learned.part, addition.steps[0])
-        yield _by_velocity(addition, learned.part)
+        if found.law.draft.at != "loop":  # what a law remembers is in no curve of the velocity
+            yield _by_velocity(addition, learned.part)
     yield from law_sections(found.law, addition, picture_of(learned))
     yield Detail(lab_words.MODEL_BY_MODEL, [
         lab_words.falling(f"NRMSE on {JUDGED_ON}", _steps(found, addition), addition.noise_floor_error)])
