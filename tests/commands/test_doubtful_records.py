@@ -71,6 +71,7 @@ def test_values_in_g_are_refused_and_converted(comfort) -> None:
     status, reported, complaints = comfort(EVEN_S, in_g - 0.995)
     assert (status, [doubt["what"] for doubt in reported["doubts"]], len(complaints)) == (0, ["quiet"], 1)
     assert "is it in g?" in complaints[0]
+    assert "did the car stand?" in comfort(EVEN_S, in_g - 0.995 + 9.8)[2][0]  # gravity shows that it is in m/s2
 
 
 @pytest.mark.parametrize("level", [9.81, 0.1])

@@ -250,7 +250,8 @@ def unit_doubts(samples: Array, file: str, moving: Bools | None) -> list[Doubt]:
     quiet_mps2, loud_mps2 = 0.1, 30.0
     counted = samples if moving is None or not moving.any() else samples[moving]
     mean, rms = counted.mean(axis=0), float(counted[:, 0].std())
-    for gravity in (abs(float(mean[0])), float(np.hypot.reduce(mean))):
+    gravities = (abs(float(mean[0])), float(np.hypot.reduce(mean)))
+    for gravity in gravities:
         if abs(gravity - gravity_g) < gravity_near and rms < gravity_calm:
             raise BadInput(f"{file}: expected accelerations in m/s2, found a mean of {gravity:.3f}, as of gravity "
                            "in g: --unit g takes them as g, --unit mps2 as they are")
@@ -258,7 +259,9 @@ def unit_doubts(samples: Array, file: str, moving: Bools | None) -> list[Doubt]:
         return []
     numbers = {"rms_mps2": rms}
     if rms < quiet_mps2:
-        return [Doubt("quiet", f"{rms:.2g} m/s2 r.m.s. is less than a moving car has: is it in g? (--unit g)", numbers)]
+        has_gravity = any(abs(one / STANDARD_GRAVITY_MPS2 - 1) < gravity_near for one in gravities)
+        asks = "did the car stand?" if has_gravity else "is it in g? (--unit g)"
+        return [Doubt("quiet", f"{rms:.2g} m/s2 r.m.s. is less than a moving car has: {asks}", numbers)]
     if rms > loud_mps2:
         return [Doubt("loud", f"{rms:.3g} m/s2 r.m.s. is more than any car has: is it in m/s2?", numbers)]
     return []
