@@ -69,6 +69,7 @@ class MadeUp:
     refined_from: int = 1
     frees: tuple[str, ...] = tuple(WORTH)
     fitted: list[tuple[str, int]] = field(default_factory=list)
+    uncertainty: float = 0.0
     stops: Callable[[str, float], bool] = lambda what, share: False
 
     def stops_before(self, what: str, share: float = 1.0) -> bool:
@@ -113,6 +114,9 @@ class MadeUp:
 
     def is_doubtful(self, base: Made, one: Tried) -> bool:
         return one.effect.name in self.doubtful
+
+    def gain_uncertainty(self, one: Made | Tried, other: Tried) -> float:
+        return self.uncertainty
 
     def leaves_noise(self, there: Made | Tried) -> bool:
         return False
@@ -350,6 +354,13 @@ def test_refinements_are_compared_with_the_plain_form_where_both_are_fitted(monk
     sought.likelihood = Slow(("sensor_gain", "tire_damping", "sensor_offset"))
     found = sought.run(Made())
     assert [(one.effect.name, one.is_plain) for one in found.now.effects] == [("dry_friction", False)]
+
+
+def test_effects_whose_gains_differ_by_less_than_these_are_uncertain_are_told_to_be_indistinguishable() -> None:
+    sure, unsure = search().run(Made()), replace(search(), likelihood=MadeUp(uncertainty=1e6)).run(Made())
+    assert sure.gains == unsure.gains
+    assert {name: rivals for name, rivals in sure.rivals.items() if rivals} == {}
+    assert all(set(rivals) == set(WORTH) - set(sure.gains) for rivals in unsure.rivals.values())
 
 
 @pytest.mark.parametrize("later", WORTH)
