@@ -353,19 +353,27 @@ def _acts(tested: ResidualEvidence) -> str:
 def _side(curve: Curve, both: str) -> str:
     """On which side a curve acts; ``both``: what to say where it acts on both in opposite directions."""
     low, high = abs(float(curve.force_n[0])), abs(float(curve.force_n[-1]))
+    if not _known_ends(curve):
+        return "mostly between its ends"
     if min(low, high) < max(low, high) / 3:
         return f"mostly in {'compression' if low > high else 'extension'}"
     return both if curve.force_n[0] * curve.force_n[-1] < 0 else "in the same direction in compression and extension"
 
 
+def _known_ends(curve: Curve) -> bool:
+    """Whether the force at one end is more than its error may be."""
+    return bool((np.abs(curve.force_n) > 2 * curve.error_n)[[0, -1]].any())
+
+
 def _ends(curve: Curve, factor: float, unit: str) -> str:
-    """The force of a curve at both its ends."""
+    """The force of a curve at both its ends, or where it is known best if at neither."""
     words = []
-    for index, side in ((0, "compression"), (-1, "extension")):
-        force, error = float(curve.force_n[index]), float(curve.error_n[index])
+    known = np.abs(curve.force_n) / np.where(curve.error_n > 0, curve.error_n, np.inf)
+    for index in (0, -1) if _known_ends(curve) else (int(np.argmax(known)),):
+        force, error, at = (float(values[index]) for values in (curve.force_n, curve.error_n, curve.at))
         digits = max(0, ceil(-log10(error))) if error > 0 else 0
         size = f"{force:+.{digits}f} ± {error:.{digits}f} N" if abs(force) > 2 * error else "about zero"
-        words.append(f"{size} at {abs(curve.at[index]) * factor:.2g} {unit} of {side}")
+        words.append(f"{size} at {abs(at) * factor:.2g} {unit} of {'compression' if at < 0 else 'extension'}")
     return f"{' and '.join(words)} (positive pulls both ends together)"
 
 

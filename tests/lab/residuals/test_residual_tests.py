@@ -13,10 +13,10 @@ import numpy.typing as npt
 import pytest
 
 from logger.lab.likelihood.lag import lag_drift, lags
-from logger.lab.residual_tests import run_residual_tests
+from logger.lab.residual_tests import residual_tests, run_residual_tests
 from logger.lab.residual_tests.tests import ResidualEvidence, ResidualTestResult, ResidualTestResults
 from logger.lab.residuals.breakdown import ModelResiduals, breakdown
-from logger.lab.residuals.force_state_map import force_map
+from logger.lab.residuals.force_state_map import Curve, force_map
 from logger.lab.residuals.road_coherence import coherence_with_road, share_proportional
 from logger.runs import Run
 from logger.simulation.virtual_drive import SimulatedRuns
@@ -248,6 +248,15 @@ def test_a_tone_that_is_none_has_a_frequency_and_no_chance() -> None:
 def test_every_test_has_a_sentence_with_all_of_its_figures() -> None:
     for one in marks(beside_with(white)).tests:
         assert one.sentence.endswith("."), one.name
+
+
+def test_a_force_that_is_not_known_at_its_ends_is_said_where_it_is() -> None:
+    at_m, force_n = np.array([-0.04, -0.02, 0.0, 0.02, 0.04]), np.array([4.0, 4.0, 0.0, -20.0, 4.0])
+    curve = Curve(at_m, force_n, np.array([5.0, 5.0, 0.0, 5.0, 5.0]), 1e-9, 0.2)
+    test = next(one for one in residual_tests() if one.name == "force by travel")
+    said = test.sentence(test.result(curve=curve, bend=1.0, acts="in the suspensions"))
+    assert "travel, mostly between its ends, would explain 20% of" in said
+    assert said.endswith("linear spring: -20 ± 5 N at 20 mm of extension (positive pulls both ends together).")
 
 
 @pytest.mark.slow
