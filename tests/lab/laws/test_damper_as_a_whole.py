@@ -20,6 +20,19 @@ from ...support.drives.part_bench import Array, force_of, moved, write_bench
 DAMPING, OIL, PLAY_M, SEALS_N, OVER_M, MORE_PER_M, SQUARE_N, CUBE_N = 400.0, 3e5, 2e-4, 25.0, 5e-4, 10.0, 15.0, 10.0
 
 
+def test_a_part_far_from_its_rest_has_nine_places_of_its_travel(tmp_path: Path) -> None:
+    """Two digits of each, of 0.5 m and more, would leave a few."""
+    place_m = 0.5 + moved(3, 1.0, 0.02, 8.0)
+    vehicle, run = tmp_path / "part.yaml", write_bench(tmp_path / "run", place_m, np.sin(np.arange(len(place_m)) / 9))
+    vehicle.write_text("name: part\nmodel: component\nstiffness_n_per_m: 0\ndamping_n_s_per_m: 400\npreload_n: 0\n")
+    posterior = bench_with(CompareQuestion(vehicle, run, anyway=True), thin=False).posterior()
+    context = LawContext(posterior, posterior.start([]))
+    at_mm = [float(one.meaning.split()[5]) for one in FAMILY.drafts(context)[0].parameters
+             if one.name.startswith("more_")]
+    low_mm, high_mm = 1000 * np.quantile(context.responses[0].travel_m[context.runs[0].first:], (0.005, 0.995))
+    assert at_mm == pytest.approx(np.linspace(low_mm, high_mm, 9), abs=0.05 * (high_mm - low_mm) / 8)
+
+
 def test_it_is_the_force_of_its_equations(tmp_path: Path) -> None:
     place_m = moved(3, 6.0, 0.02, 8.0)
     vehicle, run = tmp_path / "part.yaml", write_bench(tmp_path / "run", place_m, np.sin(np.arange(len(place_m)) / 9))

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import shlex
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -24,6 +25,12 @@ from ...support.drives.part_bench import RATE_HZ, Array, fitted_error, force_of,
 
 FORCE_N, OVER_M, POWER, STIFFNESS, DAMPING = 400.0, 0.002, 3.0, 2000.0, 300.0
 BACKLASH_M = 4e-4
+
+
+def test_a_part_without_spring_and_damper_gives_no_size_to_begin_with() -> None:
+    nothing = SimpleNamespace(suspension_stiffness_n_per_m=0.0, suspension_damping_n_s_per_m=0.0)
+    context = SimpleNamespace(vehicle=SimpleNamespace(front=nothing, is_part=True), reach=lambda what, share: 0.02)
+    assert FAMILY.drafts(context) == []  # type: ignore[arg-type]
 
 
 def true_force(place_m: Array, rate_mps: float, play_m: float) -> Array:

@@ -67,7 +67,8 @@ class DamperAsAWhole(Family):
             context.runs, context.responses, strict=True)])
         low_m, high_m = np.quantile(span_m, (0.005, 0.995))
         ends_m = np.linspace(low_m, high_m, _PLACES)
-        more = {rounded(float(at)): f"more_{number}_ratio" for number, at in enumerate(
+        digits = 1 - int(np.floor(np.log10(ends_m[1] - ends_m[0])))  # of a part far from its rest they lie close
+        more = {round(float(at), digits): f"more_{number}_ratio" for number, at in enumerate(
             [at for at in ends_m if abs(at) > 0.5 * (ends_m[1] - ends_m[0])], 1)}
         way_m = rounded(0.02 * travel_m)
 

@@ -34,11 +34,11 @@ class SlidingBehindSpring(Family):
 
     def drafts(self, context: LawContext) -> list[Draft]:
         vehicle = context.vehicle
-        if not vehicle.is_part:
-            return []
         front, travel_m, rate_mps = vehicle.front, context.reach("travel_m", 0.9), context.reach("rate_mps", 0.9)
         size_n = rounded(0.3 * (front.suspension_stiffness_n_per_m * travel_m
                                 + front.suspension_damping_n_s_per_m * rate_mps))
+        if not vehicle.is_part or size_n * travel_m == 0:
+            return []
         lengths_m = tuple(rounded(one * travel_m) for one in (0.02, 0.2))
 
         def play(*trials: float) -> Parameter:
