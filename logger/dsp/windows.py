@@ -12,9 +12,8 @@ from itertools import pairwise
 from math import nan, sqrt
 
 import numpy as np
-import numpy.typing as npt
 
-from logger.arrays import Array, Bools, Rows
+from logger.arrays import Array, Bools, Rows, Whole
 from logger.units import US_PER_S
 
 GOOD_SHARE = 0.8
@@ -34,7 +33,7 @@ class GridSamples(Rows):
     and 1 for one at the top of the range, -1 at the bottom, else 0.
     """
 
-    t_us: npt.NDArray[np.int64]
+    t_us: Whole
     reading_mps2: Array
     accel_mps2: Array
     weighted_mps2: Array
@@ -230,7 +229,7 @@ class WindowCutter:
         return [window] if window is not None else []
 
 
-def runs_of_equal(index: npt.NDArray[np.int64]) -> list[tuple[int, int]]:
+def runs_of_equal(index: Whole) -> list[tuple[int, int]]:
     """Stretches of equal values, as half-open index pairs."""
     if not len(index):
         return []

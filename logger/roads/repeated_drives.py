@@ -15,18 +15,15 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-import numpy.typing as npt
 
-from logger.arrays import Array, Bools, Rows
+from logger.arrays import Array, Bools, Indices, Rows, Whole
 from logger.roads.sections import WindowErrors, errors_of_means
-
-Ints = npt.NDArray[np.intp]
 
 _CELLS = 1 << 20
 _BITS = 24
 
 
-def place_key(way: Ints, along_m: Array, length_m: float) -> npt.NDArray[np.int64]:
+def place_key(way: Indices, along_m: Array, length_m: float) -> Whole:
     """One whole number for the cell of a way that a place lies in (n,): cells of a length from the measure 0 on. -1
     where the way or the measure is not known."""
     known = (way >= 0) & np.isfinite(along_m)
@@ -34,7 +31,7 @@ def place_key(way: Ints, along_m: Array, length_m: float) -> npt.NDArray[np.int6
     return np.where(known, (np.asarray(way, np.int64) << _BITS) | (cell + _CELLS), -1)
 
 
-def way_and_cell(key: npt.NDArray[np.int64]) -> tuple[Ints, Ints]:
+def way_and_cell(key: Whole) -> tuple[Indices, Indices]:
     """Ways and numbers of cells along them (n,), which may be negative."""
     return (key >> _BITS).astype(np.intp), (key & ((1 << _BITS) - 1)).astype(np.intp) - _CELLS
 
@@ -50,8 +47,8 @@ class Passes(Rows):
     known_m       how much of the road that is: twice the cell where the drive came twice [m]
     """
 
-    key: npt.NDArray[np.int64]
-    drive: Ints
+    key: Whole
+    drive: Indices
     time_s: Array
     iri_m_per_km: Array
     iri_errors: WindowErrors
@@ -63,8 +60,8 @@ class Passes(Rows):
         return self.iri_errors.std**2 - self.iri_errors.parts()[1] ** 2
 
 
-def passes_of(way: Ints, start_m: Array, end_m: Array, drive: Ints, time_s: Array, iri: Array, errors: WindowErrors,
-              length_m: float) -> Passes:
+def passes_of(way: Indices, start_m: Array, end_m: Array, drive: Indices, time_s: Array, iri: Array,
+              errors: WindowErrors, length_m: float) -> Passes:
     """Windows (n,) from and to measures of ways, in cells of a length; a window across a limit counts in each cell by
     its part. NaN in ``iri`` or its error, and negative ways, are left out."""
     rounding = 1e-9  # of a measure, in cells
@@ -146,8 +143,8 @@ class Means:
     first_s, last_s     of the passes [s since 1970]; NaN: not known
     """
 
-    key: npt.NDArray[np.int64]
-    drives: Ints
+    key: Whole
+    drives: Indices
     iri_m_per_km: Array
     iri_std_m_per_km: Array
     common_std_m_per_km: Array
@@ -163,7 +160,7 @@ def variances(passes: Passes, scatter: Scatter) -> Array:
                       + (np.nan_to_num(scatter.drive)**2 + np.nan_to_num(scatter.passes)**2) * level**2)
 
 
-def _weighted(passes: Passes, scatter: Scatter) -> tuple[npt.NDArray[np.int64], Ints, Array, Array]:
+def _weighted(passes: Passes, scatter: Scatter) -> tuple[Whole, Indices, Array, Array]:
     """Keys of the cells (k,), the cell and the weight of each pass (p,), and the sums of the weights (k,)."""
     key, cell = np.unique(passes.key, return_inverse=True)
     weight = 1.0 / np.maximum(variances(passes, scatter), 1e-12)
@@ -199,10 +196,10 @@ class Changes:
     mean_m_per_km              mean change of these cells, with its standard error; NaN where there is none
     """
 
-    key: npt.NDArray[np.int64]
+    key: Whole
     drives: tuple[int, ...]
-    before: Ints
-    after: Ints
+    before: Indices
+    after: Indices
     change_m_per_km: Array
     change_std_m_per_km: Array
     p_value: Array
@@ -249,8 +246,8 @@ class Trends:
     p_value, false_share  as of ``Changes``
     """
 
-    key: npt.NDArray[np.int64]
-    drives: Ints
+    key: Whole
+    drives: Indices
     per_year_m_per_km: Array
     per_year_std_m_per_km: Array
     p_value: Array
@@ -352,7 +349,7 @@ def _confidence(value: Array, std: Array, limit: float) -> Array:
     return np.where(known, ndtr(z), 0.0)
 
 
-def _rows(mean: Means, which: Bools) -> list[npt.NDArray[np.intp]]:
+def _rows(mean: Means, which: Bools) -> list[Indices]:
     """Cells that are chosen, in rows of neighbours on one way."""
     chosen = np.flatnonzero(which)
     if not len(chosen):
@@ -377,9 +374,9 @@ class WayMeans:
     iri_m_per_km    mean over what is covered, each piece of road counting by its length, with its standard error
     """
 
-    way: npt.NDArray[np.intp]
+    way: Indices
     covered_m: Array
-    drives: npt.NDArray[np.intp]
+    drives: Indices
     iri_m_per_km: Array
     iri_std_m_per_km: Array
 
@@ -408,14 +405,14 @@ class _GroupMeans:
     """
 
     covered_m: Array
-    drives: npt.NDArray[np.intp]
+    drives: Indices
     mean: Array
     variance: Array
     alike: Array
     common: Array
 
 
-def _group_means(passes: Passes, scatter: Scatter, cell_m: float, of: Ints) -> _GroupMeans:
+def _group_means(passes: Passes, scatter: Scatter, cell_m: float, of: Indices) -> _GroupMeans:
     """The means over the cells of each group, ``of`` the passes (p,): a cell as in ``way_means``, but in all groups by
     the length that each of them covers, as else how cells differ would be taken for a difference of the groups."""
     cells, cell = np.unique(np.stack([of, passes.key]), axis=1, return_inverse=True)

@@ -25,12 +25,9 @@ from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
-from logger.arrays import Array, Bools, Rows
+from logger.arrays import Array, Bools, Indices, Rows
 from logger.geodesy import EARTH_RADIUS_M
-
-Ints = npt.NDArray[np.intp]
 
 SEARCH_M = 25.0
 """How far aside a way is looked for: beyond four standard deviations of the difference of two good fixes. No receiver
@@ -64,8 +61,8 @@ class Candidates:
     east_m, north_m  (m,) of the window as seen from that point
     """
 
-    window: Ints
-    point: Ints
+    window: Indices
+    point: Indices
     east_m: Array
     north_m: Array
 
@@ -120,9 +117,9 @@ class RoadNetwork:
 
     point: Array = field(default_factory=lambda: np.zeros((0, 3)))
     heading: Array = field(default_factory=lambda: np.zeros((0, 3)))
-    way: Ints = field(default_factory=lambda: np.zeros(0, np.intp))
+    way: Indices = field(default_factory=lambda: np.zeros(0, np.intp))
     along_m: Array = field(default_factory=lambda: np.zeros(0))
-    founder: Ints = field(default_factory=lambda: np.zeros(0, np.intp))
+    founder: Indices = field(default_factory=lambda: np.zeros(0, np.intp))
     passes: Array = field(default_factory=lambda: np.zeros(0))
     ways: int = 0
     traces: int = 0
@@ -169,7 +166,7 @@ class RoadNetwork:
         east, north = east_and_north(self.point)
         return np.einsum("ij,ij->i", self.heading, east), np.einsum("ij,ij->i", self.heading, north)
 
-    def move(self, point: Ints, aside_m: Array) -> None:
+    def move(self, point: Indices, aside_m: Array) -> None:
         """Lay points into the mean of those who passed: new passes lay so far to the left of them (m,) [m]."""
         left = np.cross(self.point[point] / EARTH_RADIUS_M, self.heading[point])
         sums, count = np.zeros_like(self.point), np.zeros(len(self.point))
@@ -179,7 +176,7 @@ class RoadNetwork:
         self.passes = self.passes + count
         self._tree = None
 
-    def add(self, trace: Trace, start: int, end: int, founder: int) -> tuple[int, Array, Ints]:
+    def add(self, trace: Trace, start: int, end: int, founder: int) -> tuple[int, Array, Indices]:
         """A new way of windows of a trace from one to before another, which follow each other: its number, their
         measures along it (m,), the first half a window in, and their points (m,), -1 for one without a direction."""
         points = on_sphere(trace.lat_deg, trace.lon_deg)
@@ -249,9 +246,9 @@ class Matched(Rows):
     aside_m    how far left of that point the fix lay [m]
     """
 
-    way: Ints
+    way: Indices
     along_m: Array
-    point: Ints
+    point: Indices
     aside_m: Array
 
 
@@ -312,7 +309,7 @@ def match(network: RoadNetwork, trace: Trace, start: _State = _UNKNOWN_ERROR) ->
                    np.where(on, aside_m, np.nan)), (end_e, end_n, end_ee, end_en, end_nn)
 
 
-def _too_far(way: Ints, aside_m: Array) -> Bools:
+def _too_far(way: Indices, aside_m: Array) -> Bools:
     """Windows of stretches on one way that lie further aside on the mean than the difference of two errors should."""
     believed = 2.0  # standard deviations that a stretch may lie aside of its way
     stretch = np.cumsum(np.diff(way, prepend=way[:1]) != 0)
@@ -325,7 +322,7 @@ def _nowhere(count: int) -> Matched:
     return Matched(none, np.full(count, np.nan), none, np.full(count, np.nan))
 
 
-def _best_chain(network: RoadNetwork, trace: Trace, start: _State, found: Candidates) -> tuple[Ints, Array, Array]:
+def _best_chain(network: RoadNetwork, trace: Trace, start: _State, found: Candidates) -> tuple[Indices, Array, Array]:
     """Candidate of each window (n,), NO_WAY for none, the filtered errors (n, 5) along that chain, and how likely each
     window is to lie on its street (n,)."""
     count = len(trace.t_s)
@@ -475,7 +472,7 @@ def _drifted(state: _State, step_s: float) -> _State:
     return keeps * error_e, keeps * error_n, square * ee + new, square * en, square * nn + new
 
 
-def _traced_back(history: Sequence[Sequence[_Chain]]) -> tuple[Ints, Array]:
+def _traced_back(history: Sequence[Sequence[_Chain]]) -> tuple[Indices, Array]:
     path, states, number = np.full(len(history), NO_WAY, np.intp), np.zeros((len(history), 5)), 0
     for window in range(len(history) - 1, -1, -1):
         chain = history[window][number]
@@ -510,8 +507,8 @@ class _Lists:
     aside_m: list[float]
     left_e: list[float]
     left_n: list[float]
-    way_of: Ints
-    founder: Ints
+    way_of: Indices
+    founder: Indices
     passes: Array
 
     def goes_on(self, among: range, one: int) -> bool:
@@ -601,7 +598,7 @@ class OnRoute:
     """Windows (n,): direction ALONG or AGAINST growing measures, 0 where they lie on another road; measure of the
     middle [m], NaN there."""
 
-    direction: Ints
+    direction: Indices
     measure_m: Array
 
 

@@ -33,12 +33,9 @@ from dataclasses import dataclass
 from math import log, pi
 
 import numpy as np
-import numpy.typing as npt
 
-from logger.arrays import ROUNDING, Array, Rows
+from logger.arrays import ROUNDING, Array, Indices, Rows
 from logger.units import INCH_PER_MILE_M_PER_KM
-
-Ints = npt.NDArray[np.intp]
 
 ALONG_M = 30.0
 _ERROR_ROUNDING = 0.0005 * (1 + 3**0.5)  # of a whole and three parts with three decimals
@@ -78,8 +75,8 @@ class WindowErrors(Rows):
                 np.where(possible, self.place_std, 0.0))
 
 
-def errors_of_means(errors: WindowErrors, iri: Array, at_m: Array, length_m: Array, window: Ints, piece_m: Array,
-                    group: Ints, count: int) -> WindowErrors:
+def errors_of_means(errors: WindowErrors, iri: Array, at_m: Array, length_m: Array, window: Indices, piece_m: Array,
+                    group: Indices, count: int) -> WindowErrors:
     """Standard errors of means by length (count,), whole and by their parts.
 
     errors, iri, at_m, length_m    of windows (n,): IRI [m/km], middles and lengths [m]
@@ -92,7 +89,7 @@ def errors_of_means(errors: WindowErrors, iri: Array, at_m: Array, length_m: Arr
     level_std, common_std, place_std = of_windows.parts()
     level_std = level_std * piece_m
 
-    def total(values: Array, of: Ints = group) -> Array:
+    def total(values: Array, of: Indices = group) -> Array:
         return np.asarray(np.bincount(of, values, count), dtype=np.float64)
 
     walk, point = _scatter_share(iri) * np.maximum(whole_m - piece_m, 0.0), point_share * piece_m
@@ -244,7 +241,7 @@ def sections(windows: SectionWindows, edges_m: Array) -> RoadSections:
                         worst, worst_at_m)
 
 
-def _pieces(windows: SectionWindows, edges_m: Array) -> tuple[Array, npt.NDArray[np.intp], npt.NDArray[np.intp]]:
+def _pieces(windows: SectionWindows, edges_m: Array) -> tuple[Array, Indices, Indices]:
     """Parts of windows inside one section each: lengths [m], windows, sections."""
     cuts = np.unique(np.concatenate([windows.start_m, windows.end_m, edges_m]))
     middle_m = (cuts[1:] + cuts[:-1]) / 2
@@ -256,7 +253,7 @@ def _pieces(windows: SectionWindows, edges_m: Array) -> tuple[Array, npt.NDArray
     return piece_m[inside], window[inside], section[inside]
 
 
-def _worst(windows: SectionWindows, window: npt.NDArray[np.intp], section: npt.NDArray[np.intp], count: int
+def _worst(windows: SectionWindows, window: Indices, section: Indices, count: int
            ) -> tuple[Array, Array]:
     iri = np.nan_to_num(windows.iri_m_per_km[window], nan=-np.inf)
     order = np.lexsort((iri, section))

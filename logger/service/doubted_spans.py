@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from math import sqrt
 
 import numpy as np
-import numpy.typing as npt
 
 from drivers.readings import AccelerationBlock, Fix
+from logger.arrays import Array, Bools, Whole
 from logger.bounds import MOVING_MPS
 from logger.dsp.repeated_samples import LEAST_SHARE, are_fresh, find_repeats, fresh_samples
 from logger.estimation.drive_alignment import DEVIATIONS, DriveAlignment
@@ -42,7 +42,7 @@ class DoubtedSpans:
         """Tell whether some of [begin, end) is doubted."""
         return any(begin_us <= last_us and first_us < end_us for first_us, last_us in self._spans)
 
-    def during(self, t_us: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
+    def during(self, t_us: Whole) -> Bools:
         """Tell of instants (n,) [us] whether they are doubted."""
         doubted = np.zeros(len(t_us), dtype=np.bool_)
         for first_us, last_us in self._spans:
@@ -171,7 +171,7 @@ class Repetition:
         return (f"{100 * self.share:.0f} of 100 samples repeat the one before: ridelog computes nothing from them. "
                 "Have the sensor, or its bridge, send each reading once")
 
-    def _judge(self, t_us: npt.NDArray[np.int64], accel_mps2: npt.NDArray[np.float64]) -> None:
+    def _judge(self, t_us: Whole, accel_mps2: Array) -> None:
         share = float((~fresh_samples(accel_mps2)[1:]).mean())
         repeats = share >= LEAST_SHARE and find_repeats(accel_mps2, FALSE_ALARM) is not None
         self._unproven = 0 if repeats else self._unproven + 1
@@ -332,7 +332,7 @@ class JudgedDrive:
         self.repetition.take(block)
         return timed
 
-    def doubted(self, t_us: npt.NDArray[np.int64]) -> npt.NDArray[np.bool_]:
+    def doubted(self, t_us: Whole) -> Bools:
         """Tell of instants (n,) [us] whether what was read at them is not believed."""
         return (self.stillness.spans.during(t_us) | self.repetition.spans.during(t_us)
                 | self.speed_check.spans.during(t_us))

@@ -4,10 +4,9 @@ from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
-import numpy.typing as npt
 
 from drivers.readings import Fix
-from logger.arrays import Array, Bools
+from logger.arrays import Array, Bools, Whole
 from logger.geodesy import ground_distance_m
 from logger.units import DAY_US, US_PER_S
 
@@ -226,7 +225,7 @@ class Travel:
     speed_mps: Array
     known: Bools
     bridged: Bools
-    leg: npt.NDArray[np.int64]
+    leg: Whole
 
 
 class Odometer:
@@ -302,7 +301,7 @@ class Odometer:
         self._lon_deg.append(fix.lon_deg)
         self._leg.append(leg)
 
-    def travel(self, t_us: npt.NDArray[np.int64]) -> Travel:
+    def travel(self, t_us: Whole) -> Travel:
         """Motion at the instants ``t_us`` (n,), none of them after the newest knot."""
         if not self._t_us:
             return _unknown(len(t_us))
