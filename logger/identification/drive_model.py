@@ -155,10 +155,9 @@ class DriveModel:
         return spectra
 
     def inputs(self, values: Array) -> list[Array]:
-        """Vertical acceleration of the road under the wheels (n, w) per record with these values [m/s2], band-limited,
-        for tests."""
+        """What drives the car (n, u) per record with these values, as ``SimulatedRuns.inputs``, for tests."""
         return [one[record.first:] for one, record in zip(
-            self._runs.roads(self.car_with(values), *self._driven(values)), self.records, strict=True)]
+            self._runs.inputs(self.car_with(values), *self._driven(values)), self.records, strict=True)]
 
     def _driven(self, values: Array) -> tuple[list[Array], list[WheelTracks]]:
         """What was driven beyond the recorded distances (n,) [m], and the roads, with these values."""

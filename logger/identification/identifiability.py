@@ -133,13 +133,14 @@ def unexplained(error: float) -> list[Finding]:
                     "right ones.")]
 
 
-def upside_down(error: float, turned_error: float) -> list[Finding]:
+def upside_down(error: float, turned_error: float, what: str, pushed: bool) -> list[Finding]:
     """Whether a record is explained far better when its sign is changed: errors as measured and with the sign changed,
-    as ``unexplained``."""
+    as ``unexplained``; ``what`` was measured, and whether forces ``pushed`` it."""
     if turned_error > _CLEARLY_LESS * error:
         return []
-    return [Finding(TURNED, {}, f"the acceleration seems upside down (up is positive): the NRMSE is {error:.2f}, and "
-                                f"{turned_error:.2f} with the sign changed. Or a step has the wrong sign or position.")]
+    other = "The force may have the other sign." if pushed else "Or a step has the wrong sign or position."
+    return [Finding(TURNED, {}, f"the {what} seems upside down (up is positive): the NRMSE is {error:.2f}, and "
+                                f"{turned_error:.2f} with the sign changed. {other}")]
 
 
 def _together(names: Sequence[str], direction: Array, trace: Array) -> Finding:

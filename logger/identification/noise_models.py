@@ -276,7 +276,7 @@ def cross_correlation(white: Sequence[Array], inputs: Sequence[Array], sensitivi
     lengths = np.sqrt((columns**2).sum(axis=0))
     if not (joined.any() and lengths.any()):
         return UNTESTED
-    basis, values, _ = np.linalg.svd(columns / lengths.max(), full_matrices=False)
+    basis, values, _ = np.linalg.svd(columns[:, lengths > 0] / lengths[lengths > 0], full_matrices=False)
     basis = basis[:, values > _RANK * values[0]]
     variance = float(joined @ joined) / len(joined)
     return _test(float(((basis.T @ joined) ** 2).sum()) / variance, basis.shape[1])

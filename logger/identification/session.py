@@ -173,7 +173,8 @@ def upright_fit(
     if error > _POOR:
         turned = [replace(record, measured_mps2=-record.measured_mps2) for record in records]
         try:
-            findings = upside_down(error, fitted(turned).error_after)
+            findings = upside_down(error, fitted(turned).error_after, records[0].facts.main.measures,
+                                   any(one.pushed for one in records))
         except NotIdentifiable:
             findings = []
         if findings:

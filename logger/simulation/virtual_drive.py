@@ -404,15 +404,15 @@ class SimulatedRuns:
         with np.errstate(over="ignore", invalid="ignore"):
             return [respond(car, passage) for passage in self._passages_of(car, distance_error_m)[0]]
 
-    def roads(self, car: Car, distance_error_m: Sequence[Array], tracks: Sequence[WheelTracks]) -> list[Array]:
-        """Vertical acceleration of the road under the wheels (n, w) in each run [m/s2], as the recorder would keep it;
-        arguments as of ``predict``."""
-        def recorded_road(passage: Passage) -> Array:
-            elevation = passage.under_wheels(car.structure)[0][:, : len(car.structure.wheels)].T
+    def inputs(self, car: Car, distance_error_m: Sequence[Array], tracks: Sequence[WheelTracks]) -> list[Array]:
+        """What drives the car in each run (n, u), as the recorder would keep it: vertical accelerations of the road
+        under the wheels [m/s2], then forces [N]; arguments as of ``predict``."""
+        def recorded_inputs(passage: Passage) -> Array:
+            elevation, rest = np.split(passage.under_wheels(car.structure)[0].T, [len(car.structure.wheels)])
             accelerations = np.gradient(np.gradient(elevation, passage.step_s, axis=1), passage.step_s, axis=1)
-            return passage.recorded(accelerations, np.ones_like).T
+            return passage.recorded(np.vstack([accelerations, rest]), np.ones_like).T
 
-        return list(map(recorded_road, self._unbegun(car, distance_error_m, False, tracks)))
+        return list(map(recorded_inputs, self._unbegun(car, distance_error_m, False, tracks)))
 
     def beginnings(self, car: Car, distance_error_m: Sequence[Array] | None = None) -> list[Beginning | None]:
         """How the runs begin with this car whose initial state nobody knows, simulated roughly; None of the others."""

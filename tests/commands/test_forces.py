@@ -997,6 +997,23 @@ def test_what_forces_drive_the_other_way_is_upside_down_or_they_are(tmp_path: Pa
         main(["compare", "--vehicle", str(tmp_path / "bench.yaml"), str(run)])
 
 
+@pytest.mark.parametrize(("frame", "lacks"), [({}, False), ({"wheel": 0.4, "tire": 5400.0}, True)])
+def test_a_residual_that_follows_a_force_is_said_and_no_error_is_called_sound(
+        frame: dict[str, float], lacks: bool, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of a mass on a frame that gives, which its file does not know; it rests until it is pushed."""
+    bench, push = Bench(2.5, 900.0, 12.0, **frame), noise(20.0, 3.0, 2)
+    (tmp_path / "bench.yaml").write_text(Bench(2.5).yaml.replace("30.0", "800 +- 50%").replace("0.4", "10 +- 50%"))
+    pushed, rests = push(TIME_S), int(0.5 * RATE_HZ)
+    moved = bench.moved(NOTHING, push, NOTHING)["accel_z_mps2"]
+    read = np.r_[np.zeros(rests), moved[:-rests]] + np.random.default_rng(1).normal(0, 0.02, len(TIME_S))
+    driving = {"force_n": np.r_[np.zeros(rests), pushed[:-rests]]}
+    run = written(tmp_path / "run", {"accel_z_mps2": read}, driving, BODY)
+    assert main(["identify", "--vehicle", str(tmp_path / "bench.yaml"), str(run)]) == 0
+    words = capsys.readouterr().out
+    assert ("Do residuals follow the input?" in words) and ("the model lacks an effect" in words) is lacks
+    assert "at rest until it is driven" in words and ("can be trusted" in words) is not lacks
+
+
 def test_a_guess_of_its_spring_makes_no_record_early_after_the_refit(
         tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     bench = Bench(2.5, 900.0, 12.0, guide_n=1.0)

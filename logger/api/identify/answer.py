@@ -21,6 +21,7 @@ from logger.api.lab.checks import (
     check_rate,
     check_readings,
     check_roads,
+    from_rest,
     moves_freely,
     of_rates,
     with_initial_values,
@@ -49,8 +50,8 @@ from logger.report.blocks import SHOWN_ROWS, Blocks, Lines, Table
 from logger.report.quantities import WIDTH, measured, unit_of
 from logger.report.quantities import known as known_number
 from logger.roads.iso8608 import STANDARD_WAVINESS
+from logger.runs import Past, no_readings, past_of, runs_left_out, zero_is_known
 from logger.runs import Run as Record
-from logger.runs import no_readings, past_of, runs_left_out, zero_is_known
 from logger.simulation.virtual_drive import SimulatedRuns
 from logger.store.formats import vehicle_file
 from logger.store.formats.drive_file import RUN
@@ -167,16 +168,16 @@ def _records(drives: Sequence[Run], model: Model) -> list[Record]:
     rates that differ."""
     records, vehicle = [], model.vehicle
     for number, drive in enumerate(drives):
-        lasts_s, past_s = len(drive.time_s) / drive.rate_hz, past_of(drive.track).value
-        if not lasts_s - LEAST_SAMPLES / drive.rate_hz > past_s:
-            raise BadInput(f"{drive.path}: expected {LEAST_SAMPLES} samples or more after the first {past_s:g} s, "
-                           f"which are left out, found a drive of {lasts_s:g} s")
         check_readings(drive, drives[:number])
         check_channels(drive, model)
         zero = 0.0 if zero_is_known(drive.facts.main, drive.track) else float(drive.accel_z_mps2.mean())
-        record = Record(str(drive.path), drive.rate_hz, drive.accel_z_mps2 - zero, drive.distance_m, drive.speed_mps,
-                        Track(1.0, np.zeros(2)) if drive.track is None else drive.track, past_s,
-                        replace(drive.facts, signals=()), drive.marks(), left_out=no_readings(drive.usable))
+        record = from_rest(Record(
+            str(drive.path), drive.rate_hz, drive.accel_z_mps2 - zero, drive.distance_m, drive.speed_mps,
+            Track(1.0, np.zeros(2)) if drive.track is None else drive.track, past_of(drive.track).value,
+            replace(drive.facts, signals=()), drive.marks(), left_out=no_readings(drive.usable)))
+        if record.count - record.first <= LEAST_SAMPLES:
+            raise BadInput(f"{drive.path}: expected {LEAST_SAMPLES} samples or more after the first {record.skip_s:g} "
+                           f"s, which are left out, found a drive of {record.count / drive.rate_hz:g} s")
         check_forces(vehicle, record.track, str(drive.path / RUN))
         if record.timed:
             check_rate(drive, vehicle)
@@ -434,7 +435,8 @@ def _road_options(question: IdentifyQuestion) -> tuple[Options, IdentifyQuestion
 def _head(given: vehicle_file.CarModel, free: int, records: Sequence[Record], more: str, stop: str = ";") -> str:
     vehicle, runs = given.vehicle, "1 run" if len(records) == 1 else f"{len(records)} runs"
     begun = (f"the first {records[0].skip_s:g} s of a run left out" if records[0].skip_s else
-             "no excitation: identify estimates the initial state as well")
+             "no excitation: identify estimates the initial state as well" if records[0].past is Past.FREE else
+             "at rest until it is driven")
     return (f"{vehicle.name} ({vehicle.model.replace('_', ' ')}): {free} free, {runs}, "
             f"{sum(len(one.kept_mps2) for one in records)} samples at {records[0].rate_hz:.5g} Hz{more}{stop} {begun}")
 
@@ -536,8 +538,9 @@ def measured_lines(fit: Fit, white: noise_models.Test, free_of_road: noise_model
     yield from _far_from_file(fit)
     yield f"The residual is modelled as {fit.noise.words}."
     yield from _correlated(fit)
-    yield from _checks(white, free_of_road)
-    yield from _measured_limits(fit, sound=not any(doubts(fit, white, free_of_road)))
+    sound = not any(doubts(fit, white, free_of_road))
+    yield from _checks(white, free_of_road, sound)
+    yield from _measured_limits(fit, sound)
 
 
 def common_words(model: DriveModel, common: CommonRoughness) -> Iterator[str]:
@@ -600,10 +603,10 @@ def _correlated(fit: Fit | RoadFit) -> Iterator[str]:
         yield f"Correlated estimates (correlation beyond {_MENTIONED:g}): {'; '.join(large)}."
 
 
-def _checks(white: noise_models.Test, free_of_road: noise_models.Test) -> Iterator[str]:
+def _checks(white: noise_models.Test, free_of_road: noise_models.Test, sound: bool) -> Iterator[str]:
     if white.degrees:
         yield (f"Are residuals white (Ljung-Box)? p = {white.p_value:.2g} over {white.degrees} degrees of freedom: "
-               + ("yes, standard errors can be trusted." if white.passed else
+               + (f"yes{', standard errors can be trusted' * sound}." if white.passed else
                   "no, the noise model is incomplete; the standard errors are a guide only."))
     if not white.degrees and not free_of_road.degrees:
         yield "There is no residual to test."

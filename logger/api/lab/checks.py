@@ -490,7 +490,12 @@ def driven_stretches(drive: Drive, shortest_s: float = LEAST_S) -> list[Run]:
                 usable=drive.marks(part), more=_more(drive, part),
                 left_out=(*([cut] if part is parts[0] else []), *no_readings(drive.marks(part))))
             for part in parts]
-    return [replace(run, skip_s=0.0) if _rests_until_driven(run) else run for run in runs]
+    return list(map(from_rest, runs))
+
+
+def from_rest(run: Run) -> Run:
+    """The run, with nothing left out for its past where that is known: it rests until it is driven."""
+    return replace(run, skip_s=0.0) if _rests_until_driven(run) else run
 
 
 def _rests_until_driven(run: Run) -> bool:
