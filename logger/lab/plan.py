@@ -58,7 +58,7 @@ from logger.lab.selection.evidence import INDISTINGUISHABLE
 from logger.printable import Notify, silent
 from logger.profiles.excitation import Excitation
 from logger.profiles.track import Track
-from logger.runs import LEAST_S, RecordFacts, Run, Signal
+from logger.runs import LEAST_S, SKIP_S, RecordFacts, Run, Signal
 from logger.simulation.virtual_drive import (
     SEARCH_HZ,
     Obstacle,
@@ -131,12 +131,13 @@ def at_speed(name: str, track: Track, vehicle: Vehicle, speed_mps: float, signal
 def repeat_run(run: Run, signals: Sequence[Signal], most_s: float) -> Run:
     """The beginning of a run repeated, with other signals and an empty record."""
     count = min(run.count, int(most_s * run.rate_hz))
-    empty = _empty(run.name, run.track, run.distance_m[:count], run.speed_mps[:count], signals)
-    return replace(empty, rate_hz=run.rate_hz, facts=replace(empty.facts, main=run.facts.main))
+    empty = _empty(run.name, run.track, run.distance_m[:count], run.speed_mps[:count], signals, run.rate_hz, run.skip_s)
+    return replace(empty, facts=replace(empty.facts, main=run.facts.main))
 
 
-def _empty(name: str, track: Track | Excitation, distance_m: Array, speed_mps: Array, signals: Sequence[Signal]) -> Run:
-    return Run(name, RATE_HZ, np.zeros(len(distance_m)), distance_m, speed_mps, track,
+def _empty(name: str, track: Track | Excitation, distance_m: Array, speed_mps: Array, signals: Sequence[Signal],
+           rate_hz: float = RATE_HZ, skip_s: float = SKIP_S) -> Run:
+    return Run(name, rate_hz, np.zeros(len(distance_m)), distance_m, speed_mps, track, skip_s,
                facts=RecordFacts(signals=tuple(signals)), more=np.zeros((len(signals), len(distance_m))))
 
 

@@ -15,10 +15,12 @@ from logger.lab.plan import (
     SensorNoise,
     at_speed,
     outlook,
+    repeat_run,
     representatives,
 )
 from logger.profiles.track import Track
 from logger.roads import iso8608
+from logger.runs import Run
 from logger.shipped import vehicle_file
 from logger.store.formats.effect_file import shipped_effects
 from logger.store.formats.vehicle_file import read_vehicle
@@ -53,6 +55,13 @@ def test_what_remains_is_what_least_squares_leave() -> None:
             beside = [left_by(np.vstack([numbers, changes[one]]), np.append(deviations, np.inf), changes[column])
                       for one in settings.columns_of(other)]
             assert found.pairwise[row, other] == pytest.approx(min(beside))
+
+
+def test_a_repeated_run_leaves_out_no_more_than_the_run() -> None:
+    """A part's of a second: of that of a drive, two, there would be nothing left."""
+    still = np.zeros(250)
+    again = repeat_run(Run("part", 250.0, still, still, still, Track(1.0, np.zeros(2)), skip_s=0.1), [], 60.0)
+    assert (again.rate_hz, again.first, again.count) == (250.0, 25, 250)
 
 
 def test_an_effect_is_as_likely_named_as_not_where_it_just_stands_out() -> None:
