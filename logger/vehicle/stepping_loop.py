@@ -617,7 +617,7 @@ def steps(
     acts = (numbers[:, : PAIR + 1].any() or numbers[:, TIRE_DAMPING].any() or len(asked[0]) > 0
             or not np.isinf(numbers[:, MOST_PULL_N]).all())
     passes = _PASSES if acts else 0
-    sweeps = 1 if (rubs_at[:, ON_TIRE] < 0).all() else _SWEEPS
+    sweeps = 1 if len(rubs) < 2 or (rubs_at[:, ON_TIRE] < 0).all() else _SWEEPS
     mounts = np.zeros((w, 3))
     if passes:  # what the laws do in the state that it begins in, to a mount that is at rest
         begun = np.zeros(2 * w)

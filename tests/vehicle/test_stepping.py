@@ -337,3 +337,14 @@ def test_motions_of_a_linear_car_are_stepped_in_blocks(monkeypatch: pytest.Monke
         for motion in ("accel_z_mps2", "travel_m", "rate_mps", "deflection_m", "deflection_mps"):
             assert np.abs(getattr(expected, motion)).max() > 1e-4
             assert getattr(found, motion) == pytest.approx(getattr(expected, motion), abs=1e-9)
+
+
+@pytest.mark.parametrize(("name", "values", "dear"), [
+    ("damper_blow_off", {}, False), ("dry_friction", {}, False),
+    ("dry_friction", {"transition_velocity_m_per_s": 0.02}, True),
+    ("frame_friction", {"body_friction_force_n": 60.0, "static_to_sliding_ratio": 1.5}, True),
+    ("hysteresis", {}, True)])
+def test_what_asks_functions_or_exponentials_at_each_step_is_dear(
+        name: str, values: dict[str, float], dear: bool) -> None:
+    usual = shipped_effects()[name].usual
+    assert compose(RAV4, [effect(name, **(usual | values))]).is_dear is dear
