@@ -35,7 +35,7 @@ from logger.estimation.error_bound import ErrorBound, pooled_r2
 from logger.estimation.rms_calibration import LEVELS_IRI
 from logger.estimation.road_spectrum import FLATTENED_BELOW_CPM, RoadSpectrum
 from logger.estimation.sensor_noise import UNKNOWN_LOG_STD, NoiseBelief, Sensor
-from logger.estimation.streaming import BALANCED_LAG_S, LAG_S, RoadEstimator, RoadPiece
+from logger.estimation.streaming import BALANCED_LAG_S, RoadEstimator, RoadPiece
 from logger.estimation.time_grid import RATE_HZ
 from logger.profiles.track import Track
 from logger.roads.iri import COARSEST_SPACING_M, START_M, likely_unit, rectified_slope, window_iri
@@ -114,9 +114,8 @@ def estimated(
     ``is_measured`` the cars that it may be instead, and ``noise_log_std`` how well the noise is known, as
     ``RoadEstimator`` has them."""
     pieces: list[RoadPiece] = []
-    # Bounds and level follow one another late: 24 drives of coarse readings lose by more lag (R2 .636, .631 with 10 s).
     estimator = RoadEstimator(car, sensor, window_m, on_road=pieces.append, off=off, is_measured=is_measured,
-                              noise_log_std=noise_log_std, lag_s=LAG_S if sensor.is_coarse else BALANCED_LAG_S)
+                              noise_log_std=noise_log_std, lag_s=BALANCED_LAG_S)
     count = len(reading_mps2)
     found = estimator.push(reading_mps2, np.ones(count, dtype=np.bool_), np.zeros(count), distance_m)
     found += estimator.finish()

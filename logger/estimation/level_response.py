@@ -20,7 +20,7 @@ import numpy as np
 from logger.arrays import Array, Bools, Complex
 from logger.estimation.quantisation import GaussianReadings
 from logger.estimation.road_solver import Block
-from logger.estimation.roughness import resolved_shares
+from logger.estimation.roughness import ResolvedShares
 from logger.estimation.scored_variances import BLOCK_SHARE
 
 RISE = 0.4  # of the log level, by 22 % of an IRI: about a standard error of it where steps hide a road
@@ -44,16 +44,13 @@ class Answer:
     waves: Complex
     innovations: Array
     log_variance: Array
-    gain: Array
-    sharper: Array
+    shares: ResolvedShares
     seen: Array
-    free: float | None
 
     def slope(self, counted: Array) -> tuple[float, float]:
         """Of the log evidence, in a level that all points ``counted`` (n,) share, and its expected curvature."""
-        resolved, freedom = resolved_shares(self.log_variance + np.log(self.sharper), self.gain, self.seen, self.free)
-        return (0.5 * float(counted @ (self.innovations**2 * np.exp(-self.log_variance) - resolved)),
-                0.5 * float(counted @ freedom))
+        return (0.5 * float(counted @ (self.innovations**2 * np.exp(-self.log_variance) - self.shares.points)),
+                0.5 * float(counted @ self.shares.freedom))
 
 
 class LevelResponse:

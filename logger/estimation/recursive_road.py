@@ -30,7 +30,7 @@ from logger.estimation.quantisation import (
 )
 from logger.estimation.road_solver import Block, Solution
 from logger.estimation.road_spectrum import COMMON_ROAD, RoadSpectrum, learned
-from logger.estimation.roughness import RoadLevels, mean_resolved, resolved_shares
+from logger.estimation.roughness import RoadLevels, resolved_shares
 from logger.estimation.scored_variances import ScoredVariances
 from logger.estimation.sensor_noise import (
     NoiseBelief,
@@ -289,7 +289,7 @@ class FollowedRoad:
 
         moving = np.repeat(block.moving, reads) & each
         mean_variance = 1 / float(weight[moving].mean()) if moving.any() else float(variance.mean())
-        gain, ratio, free, even_share = solution.gain, np.ones(block.count), None, 1.0
+        ratio, free, even_share = np.ones(block.count), np.inf, 1.0
         if self._is_coarse:
             motion = steady_motion(block.car, block.mean_speed_mps, self._spectrum, RATE_HZ, len(samples))
             residual = readings.value_mps2 - solution.fitted_mps2
@@ -318,18 +318,16 @@ class FollowedRoad:
         left, slope, curvature = block.grid.drift_evidence(solution, drift_variance, even_share)
         if learns and is_last:
             self._drift.learn(np.array([slope]), np.array([curvature]))
-        now = spectrum
+        now, shares = spectrum, resolved_shares(np.log(local * ratio), solution.gain, seen)
         if learns or before is None:
-            resolved = mean_resolved(gain, (local * ratio)[seen > 0])
             # A lone obstacle is no level: an innovation counts with at most some deviations that are expected there.
-            most = UNUSUAL_SIGMA * np.sqrt(resolved_shares(np.log(local * ratio), gain, seen, None)[0])
+            most = UNUSUAL_SIGMA * np.sqrt(shares.points)
             white = np.clip(solution.innovations / np.sqrt(local), -most, most)
             power = np.abs(np.fft.rfft(white)) ** 2 / block.count
             # The level goes with the roughness along the block: two that follow the same slope would overshoot.
-            now = learned(now, power, resolved, block.log_waves, seen_share, before)
-        innovations, gain = exp(0.5 * above_common) * solution.innovations, exp(-above_common) * gain
-        self._roughness.learn(first, innovations, log_variance, gain, seen, sharper=ratio, free=free,
-                              learns=learns and is_last and before is not None)
+            now = learned(now, power, shares.waves, block.log_waves, seen_share, before)
+        innovations, shares = exp(0.5 * above_common) * solution.innovations, shares.at_most(free, seen)
+        self._roughness.learn(first, innovations, log_variance, shares, seen, learns and is_last and before is not None)
         found = self._roughness.at(first, block.count)
         level = COMMON_ROAD.log_level + float(seen @ found / seen.sum())
         self._spectrum = replace(now, log_level=level)
@@ -342,14 +340,14 @@ class FollowedRoad:
                 change = np.log(improved_ones.variance[moving] / readings.variance[moving])
                 self._bounds_moved = float(np.sqrt(np.mean(change**2)))
             self._answer = Answer(improved_ones, moving, expected, about, solution.waves, innovations, log_variance,
-                                  gain, ratio, seen, free)
+                                  shares, seen)
             # Bounds and road go along with the level.
             rise = self._roughness.solved_with(first, block.count) - log_variance
             self._gaussian = self._response.readings_at(improved_ones, np.repeat(block.felt(rise), reads))
             self._solved_last = block, self._response.waves_at(block, self._solved_last[1], rise)
         else:
             residual = readings.value_mps2 - solution.fitted_mps2
-            resolved_waves = 2 * seen_share * float(resolved.sum())
+            resolved_waves = 2 * seen_share * float(shares.waves.sum())
             slope, free = noise_slope(residual, weight, resolved_waves)
             self._log_noise = with_noise(self._log_noise, slope, free)
             if learns and self._learner is not None:

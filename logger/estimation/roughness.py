@@ -20,7 +20,7 @@ Kalman filter, for such processes are Markov's. Their variances are learned by s
 """
 
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 
 import numpy as np
@@ -42,7 +42,6 @@ _MOST_COMMON = 100.0  # w keeps within 14 %, which costs nothing
 _LEAST_OF_MEAN = 0.1  # a place that shows less says nothing of the scatter
 _TAKEN_OVER = 0.6  # of a new scale, so that it does not overshoot
 _TABLE_STEP = 0.5
-_CLASSES = 8
 # Towards the most probable level, where bounds follow it late: until they do, the curvature is the expected one, and
 # more than twice the step that it allows runs in circles.
 _WAY, _MOST_OF_CURVATURE = 0.75, 1.5
@@ -89,6 +88,22 @@ class _Level:
         near = np.clip(at, 0, len(self.log_level) - 1)
         known = at == near
         return self.log_level[near], self.shown[near] * known, self.information[near] * known
+
+
+@dataclass(frozen=True)
+class ResolvedShares:
+    """What the readings resolve of a road's variance: shares (n,) of each of its ``points``, means over the waves, with
+    their degrees of ``freedom`` (n,), the means of their squares; and (k,) of each of its ``waves``, means over the
+    points that were seen."""
+
+    points: Array
+    freedom: Array
+    waves: Array
+
+    def at_most(self, freedom: float, seen: Array) -> "ResolvedShares":
+        """Where all that was ``seen`` (n,) takes no more degrees of freedom of the readings: a hole rings on in these,
+        which makes them more than it has."""
+        return replace(self, points=self.points * min(freedom / float(seen @ self.points), 1.0))
 
 
 class RoadLevels:
@@ -161,35 +176,30 @@ class RoadLevels:
         at = (first + np.arange(count)) // self._cell
         return self._level.cells(int(at[0]), int(at[-1] - at[0]) + 1)[0][at - at[0]]
 
-    def learn(self, first: int, innovations: Array, log_before: Array, gain: Array, seen: Array,
-              sharper: Array | float = 1.0, learns: bool = False, free: float | None = None) -> None:
+    def learn(self, first: int, innovations: Array, log_before: Array, shares: ResolvedShares, seen: Array,
+              learns: bool = False) -> None:
         """Take what a solved block says.
 
         innovations    (n,) v at its points; n is even
         log_before     (n,) the log variance that it was solved with
-        gain           (n // 2 + 1,) information over prior of each wave where that is 0
+        shares         of it that the readings resolve
         seen           (n,) 1 where the road was read, else 0
-        sharper        (n,) information there over that of ``gain``
         learns         the variances and the scatter as well: once per block
-        free           degrees of freedom that the road takes of the readings where it was read, at most; None: what
-                       follows from ``gain``
         """
         if self._held is not None or not seen.any():
             return
         count = len(innovations)
-        strength = log_before + np.log(sharper)
-        resolved, freedom = resolved_shares(strength, gain, seen, free)
         squares = innovations**2
-        rows = np.stack([squares, resolved, squares - (resolved - freedom) * np.exp(log_before), freedom,
-                         np.ones(count)]) * seen
-        shares = neighbours(count, self._reach)
-        power, weight, squares, freedom, near = np.fft.irfft(np.fft.rfft(rows) * shares, count)
+        rows = np.stack([squares, shares.points, squares - (shares.points - shares.freedom) * np.exp(log_before),
+                         shares.freedom, np.ones(count)]) * seen
+        about = neighbours(count, self._reach)
+        power, weight, squares, freedom, near = np.fft.irfft(np.fft.rfft(rows) * about, count)
         power, weight, freedom = (np.maximum(row, 0.0) for row in (power, weight, freedom))
-        self._learn_level(first, squares, freedom, weight, seen / float(shares[0]), learns)
+        self._learn_level(first, squares, freedom, weight, seen / float(about[0]), learns)
         level = self._levels(first, count)
         power = power * np.exp(-level)
         if learns:
-            self._learn_scatter(power, weight, gain * np.exp(float(seen @ strength / seen.sum())), seen > 0)
+            self._learn_scatter(power, weight, shares.waves, seen > 0)
         fresh = np.log((self._common + power) / (self._common + weight))
         fresh = _TAKEN_OVER * fresh + (1 - _TAKEN_OVER) * (log_before - level)
         self._first, self._log_scale = first, np.where(near > ROUNDING, fresh, 0.0)
@@ -256,12 +266,12 @@ class RoadLevels:
         curvature = 0.5 * (products * products.transpose(0, 2, 1)).sum(axis=(1, 2))
         self._scored.learn(slope, curvature)
 
-    def _learn_scatter(self, power: Array, weight: Array, gain: Array, inside: Bools) -> None:
+    def _learn_scatter(self, power: Array, weight: Array, resolved: Array, inside: Bools) -> None:
         """By how much the local means of a block scatter more than chance makes them: their variance less that of a
-        weighted sum of squares of what has the correlation that the resolved shares give it (Isserlis)."""
+        weighted sum of squares of what has the correlation that the shares (k,) of its waves give it (Isserlis)."""
         count = len(power)
         near = neighbours(count, self._reach)
-        correlation = np.fft.irfft(gain / (1 + gain), count)
+        correlation = np.fft.irfft(resolved, count)
         if correlation[0] <= 0 or not power.any():
             return
         chance = 2 * float(np.fft.irfft(near**2, count) @ correlation**2) / (correlation[0] * near[0]) ** 2
@@ -275,18 +285,20 @@ class RoadLevels:
         self._common = 2 / max(scatter, 2 / _MOST_COMMON)
 
 
-def resolved_shares(strength: Array, gain: Array, seen: Array, free: float | None) -> tuple[Array, Array]:
-    """What the readings resolve of each point (n,) of relative variance exp(strength), and their degrees of freedom:
-    the share's mean over the waves, and that of its square; ``free`` is its sum over what was ``seen`` (n,)."""
-    table = np.arange(strength.min(), strength.max() + _TABLE_STEP, _TABLE_STEP)
+def resolved_shares(strength: Array, gain: Array, seen: Array) -> ResolvedShares:
+    """Of points (n,) of relative variance exp(strength) that were ``seen`` (n,) 1 or 0, with the ``gain`` (k,) of each
+    wave, information over prior, where that variance is 1."""
+    place = (strength - strength.min()) / _TABLE_STEP
+    low = place.astype(np.int64)
+    above = (place - low) * seen
+    counts = np.bincount(low, seen - above, int(low.max()) + 2) + np.bincount(low + 1, above, int(low.max()) + 2)
+    table = strength.min() + _TABLE_STEP * np.arange(len(counts))
     share = np.exp(table)[:, None] * gain
     share /= 1 + share
-    resolved, freedom = (
+    points, freedom = (
         np.exp(np.interp(strength, table, np.log(np.maximum(each.sum(axis=1) * (2 / len(strength)), 1e-300))))
         for each in (share, share**2))
-    if free is not None:  # a hole rings on in the readings, which makes them more than it has degrees of freedom
-        resolved = resolved * min(free / float(seen @ resolved), 1.0)
-    return resolved, freedom
+    return ResolvedShares(points, freedom, counts @ share / max(float(seen.sum()), 1.0))
 
 
 @lru_cache(maxsize=16)
@@ -294,16 +306,3 @@ def _processes(count: int, cell_m: float) -> Array:
     """Covariances (lengths, count, count) over cells of processes of variance 1; kept, for there are few counts."""
     lag_m = cell_m * np.abs(np.arange(count)[:, None] - np.arange(count))
     return np.exp(-lag_m / LENGTHS_M[:, None, None])
-
-
-def mean_resolved(gain: Array, variance: Array) -> Array:
-    """Share of each wave that the readings resolve, mean over points of relative variance d (n,)."""
-    if not len(variance):
-        return gain / (1 + gain)
-    logs = np.log(variance)
-    lowest, width = logs.min(), (logs.max() - logs.min()) / _CLASSES
-    classes = np.minimum((logs - lowest) / width, _CLASSES - 1).astype(np.int64) if width else np.zeros(len(logs), int)
-    counts, sums = np.bincount(classes), np.bincount(classes, logs)
-    counts, sums = counts[counts > 0], sums[counts > 0]
-    strength = np.exp(sums / counts)[:, None] * gain
-    return np.asarray((counts / counts.sum()) @ (strength / (1 + strength)))

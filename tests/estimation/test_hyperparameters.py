@@ -16,7 +16,7 @@ from logger.estimation.road_spectrum import (
     learned,
     log_waves,
 )
-from logger.estimation.roughness import mean_resolved
+from logger.estimation.roughness import resolved_shares
 from logger.estimation.sensor_noise import noise_slope, with_noise
 from logger.roads import iso8608
 from logger.shipped import vehicle_file
@@ -127,7 +127,7 @@ def test_slope_is_that_of_the_exact_evidence_of_a_drive(variance_of: Callable[[B
     weight = np.full(1024, NOISE_MPS2**-2)
     solution = block.solve(reading, weight, now, variance, DRIFT, 400)
     share = block.seen_points(weight > 0) / block.count
-    resolved = mean_resolved(solution.gain, variance[block.seen(weight > 0) > 0])
+    resolved = resolved_shares(np.log(variance), solution.gain, block.seen(weight > 0)).waves
     found = learned(now, whitened(block, solution, variance), resolved, block.log_waves, share, None)
     step = np.array([found.log_level - now.log_level, found.waviness - now.waviness])
     h = 0.02

@@ -10,7 +10,7 @@ import pytest
 from logger.estimation.car_response import CarResponse
 from logger.estimation.road_solver import Block, TimeGrid
 from logger.estimation.road_spectrum import RoadSpectrum
-from logger.estimation.roughness import LENGTHS_M, RoadLevels, mean_resolved
+from logger.estimation.roughness import LENGTHS_M, RoadLevels, resolved_shares
 from logger.shipped import vehicle_file
 from logger.store.formats.vehicle_file import read_vehicle
 from logger.vehicle.linear_car import LinearCar
@@ -51,6 +51,13 @@ def read(variance: np.ndarray, rng: np.random.Generator) -> np.ndarray:
     return matrix @ (np.sqrt(variance) * rng.standard_normal(block.count)) + rng.normal(0, NOISE_MPS2, COUNT)
 
 
+def learn(found: RoadLevels, innovations: np.ndarray, log_before: np.ndarray, gain: np.ndarray,
+          seen: np.ndarray | None = None, first: int = 0, learns: bool = False) -> None:
+    """What a block says from its ``first`` point on; all of it was seen where nothing is said of that."""
+    read = np.ones(len(innovations)) if seen is None else seen.astype(float)
+    found.learn(first, innovations, log_before, resolved_shares(log_before, gain, read), read, learns)
+
+
 def settled(reading: np.ndarray, rounds: int = 16) -> RoadLevels:
     """What is learned of a block from nothing, round by round."""
     block, _, seen = a_block()
@@ -59,7 +66,7 @@ def settled(reading: np.ndarray, rounds: int = 16) -> RoadLevels:
         log_variance = found.solved_with(0, block.count)
         solution = block.solve(reading, weights(), ROAD, np.exp(log_variance), DRIFT, 12, start)
         start = solution.waves
-        found.learn(0, np.fft.irfft(start, block.count), log_variance, solution.gain, seen.astype(float))
+        learn(found, np.fft.irfft(start, block.count), log_variance, solution.gain, seen)
     return found
 
 
@@ -130,7 +137,7 @@ def test_one_round_is_newtons_with_the_exact_posterior(variance_of: Callable[[],
     expected = level[cells[inside]] + 0.6 * np.log(scale) + 0.4 * (np.log(before[inside]) - level[cells[inside]])
 
     found, gain = RoadLevels(SPACING_M), block.solve(reading, weights(), ROAD, before, DRIFT, 1).gain
-    found.learn(0, innovations, np.log(before), gain, seen.astype(float))
+    learn(found, innovations, np.log(before), gain, seen)
     chosen = np.flatnonzero(seen)[40:-40]
     expected = expected[chosen - np.flatnonzero(inside)[0]]
     assert np.std(expected - np.log(before[chosen])) > 0.3  # there is something to learn
@@ -199,7 +206,7 @@ def test_the_mean_variance_of_a_gaussian_road_is_right_however_little_is_resolve
         strength = gain * np.exp(log_before.mean())
         innovations = np.fft.irfft(white * strength / (1 + strength), count)
         for _ in range(4):
-            found.learn(0, innovations, log_before, gain, np.ones(count))
+            learn(found, innovations, log_before, gain)
         # log normal, of this mean logarithm and variance
         means.append(np.exp(found.at(0, count) + 0.5 * found.log_std(0, count) ** 2).mean())
     assert np.mean(means[4:]) == pytest.approx(true, rel=0.15)
@@ -231,7 +238,7 @@ def learned_from(first: int, innovations: np.ndarray, found: RoadLevels) -> None
     """A block that shows its innovations exactly, until it settles."""
     count = len(innovations)
     for _ in range(16):
-        found.learn(first, innovations, found.solved_with(first, count), np.full(count // 2 + 1, 1e6), np.ones(count))
+        learn(found, innovations, found.solved_with(first, count), np.full(count // 2 + 1, 1e6), first=first)
 
 
 def test_what_blocks_behind_have_shown_counts_as_if_all_were_one_block() -> None:
@@ -263,10 +270,10 @@ def test_what_is_learned_is_kept_by_place() -> None:
 
 def test_readings_that_tell_nothing_teach_nothing() -> None:
     found = RoadLevels(SPACING_M)
-    found.learn(0, np.zeros(256), np.zeros(256), np.full(129, 1e-9), np.ones(256))
+    learn(found, np.zeros(256), np.zeros(256), np.full(129, 1e-9))
     assert found.solved_with(0, 256) == pytest.approx(np.zeros(256), abs=1e-4)
     assert found.log_std(0, 100) == pytest.approx(np.sqrt(1.8**2 + 0.2 + 0.5), rel=0.05)
-    found.learn(0, np.zeros(256), np.full(256, 2.0), np.full(129, 1e3), np.zeros(256))
+    learn(found, np.zeros(256), np.full(256, 2.0), np.full(129, 1e3), np.zeros(256))
     assert found.solved_with(0, 256) == pytest.approx(np.zeros(256), abs=1e-4)
 
 
@@ -280,7 +287,7 @@ def test_a_hole_that_was_looked_for_elsewhere_makes_no_road_smooth() -> None:
         believed = np.zeros(1024)
         believed[100 + 25 * number] = 16.0
         innovations[100 + 25 * number] = 0.0
-        found.learn(0, innovations, believed, gain, np.ones(1024), learns=True)
+        learn(found, innovations, believed, gain, learns=True)
     assert found.solved_with(0, 1024).mean() == pytest.approx(0.0, abs=1.0)
     assert found.variances.max() < 4
 
@@ -291,7 +298,7 @@ def test_less_power_than_expected_makes_a_road_as_much_smoother_as_more_makes_it
     gain, share, found = np.full(513, 0.15), 0.15 / 1.15, []
     for _ in range(300):
         one = RoadLevels(SPACING_M)
-        one.learn(0, np.sqrt(share) * rng.standard_normal(1024), np.zeros(1024), gain, np.ones(1024))
+        learn(one, np.sqrt(share) * rng.standard_normal(1024), np.zeros(1024), gain)
         found.append(one.solved_with(0, 1024).mean())
     assert np.mean(found) == pytest.approx(0.0, abs=0.1)
 
@@ -303,8 +310,9 @@ def test_mean_reported_is_the_mean_over_points(variance: np.ndarray) -> None:
     gain = np.geomspace(1e-4, 1e4, 41)
     direct = (variance[:, None] * gain / (1 + variance[:, None] * gain)).mean(axis=0)
     tolerance = 1e-12 if np.ptp(variance) == 0 else 2e-3
-    assert mean_resolved(gain, variance) == pytest.approx(direct, abs=tolerance)
-    assert mean_resolved(gain, np.empty(0)) == pytest.approx(gain / (1 + gain))
+    seen = np.append(np.ones(300), np.zeros(50))
+    found = resolved_shares(np.append(np.log(variance), np.full(50, 3.0)), gain, seen)
+    assert found.waves == pytest.approx(direct, abs=tolerance)
 
 
 def learned_over_drives(variance: np.ndarray) -> tuple[float, RoadLevels]:
@@ -317,7 +325,7 @@ def learned_over_drives(variance: np.ndarray) -> tuple[float, RoadLevels]:
             before = found.solved_with(0, block.count)
             solution = block.solve(reading, weights(), ROAD, np.exp(before), DRIFT, 12, start)
             start = solution.waves
-            found.learn(0, np.fft.irfft(start, block.count), before, solution.gain, seen.astype(float), 1.0, left == 0)
+            learn(found, np.fft.irfft(start, block.count), before, solution.gain, seen, learns=left == 0)
         if drive > 8:
             scatter.append(found.solved_with(0, block.count)[seen].std())
     return float(np.mean(scatter)), found
@@ -354,8 +362,8 @@ def test_an_even_block_counts_against_scatter_no_more_than_a_patchy_one_for_it()
     even = np.full(count, float(slow.std()))
     found, fresh = RoadLevels(SPACING_M), RoadLevels(SPACING_M)
     for innovations in [even, patchy] * 30:
-        found.learn(0, innovations, np.zeros(count), gain, np.ones(count), learns=True)
-    fresh.learn(0, patchy, np.zeros(count), gain, np.ones(count))
+        learn(found, innovations, np.zeros(count), gain, learns=True)
+    learn(fresh, patchy, np.zeros(count), gain)
     scatter, unlearned = (float(one.solved_with(0, count).std()) for one in (found, fresh))
     assert scatter > 0.5 * unlearned
 
@@ -367,7 +375,7 @@ def test_a_place_that_jumps_costs_no_memory() -> None:
     found, gain = RoadLevels(SPACING_M), np.full(count // 2 + 1, 1.0)
     innovations = np.random.default_rng(5).standard_normal(count)
     tracemalloc.start()
-    found.learn(0, innovations, np.zeros(count), gain, np.ones(count))
+    learn(found, innovations, np.zeros(count), gain)
     most = tracemalloc.get_traced_memory()[1]
     tracemalloc.stop()
     assert most < 150e6
@@ -385,6 +393,6 @@ def test_the_level_comes_to_rest_whatever_the_curvature_that_bounds_lead_to(curv
     for _ in range(40):
         log_variance = found.solved_with(0, block.count)
         variance = np.exp(log_variance)
-        found.learn(0, noisy * variance / (variance + 1), log_variance, gain, seen.astype(float))
+        learn(found, noisy * variance / (variance + 1), log_variance, gain, seen)
     assert found.moved < 0.01
     assert found.at(0, block.count)[seen].mean() == pytest.approx(np.log(15), abs=0.4)
