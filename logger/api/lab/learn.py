@@ -29,7 +29,7 @@ from logger.printable import Notify, silent
 from logger.question import function
 from logger.report.blocks import Block, Blocks, Bullets, Detail, Hint, Section, Table, page
 from logger.report.document import Html, tiles
-from logger.report.quantities import finite, measured, numbers_of, unit_of
+from logger.report.quantities import enumerated, finite, measured, numbers_of, unit_of
 from logger.store.formats import effect_file
 from logger.vehicle.effect import Chosen
 from logger.vehicle.uncertain import sized
@@ -181,7 +181,7 @@ def why_none(found: Learning) -> str:
         return NOTHING
     if not found.verdict:
         return "no law learned: something is missing, but no known effect and no law of these families explains it"
-    names = " and ".join(found.verdict)
+    names = enumerated(found.verdict, "and")
     many = len(found.verdict) > 1
     if found.unexplained or (found.diagnosis is not None and not found.diagnosis.reaches_floor):
         return (f"no law learned: {names} explain{'s' * (not many)} part of what is missing, and no law of these "
