@@ -31,9 +31,10 @@ def test_it_is_the_force_of_its_equations(tmp_path: Path) -> None:
     bench = bench_with(CompareQuestion(vehicle, run, anyway=True), thin=False)
     posterior = bench.posterior()
     context = LawContext(posterior, posterior.start([]))
-    law = chosen((draft := FAMILY.drafts(context)[0]).effect, LAW)
+    effect = FAMILY.drafts(context)[0].effect
+    law = chosen(effect, effect.usual | LAW)
     usual_m, usual_mps = context.reach("travel_m", 0.9), context.reach("rate_mps", 0.9)
-    assert {one.name for one in draft.parameters} == LAW.keys()
+    assert law.values.keys() == {*LAW, "usual_travel_m"}
     rest_m = float(np.mean(place_m - context.responses[0].travel_m[:, 0]))
     branch = STIFFNESS * 0.8 * 4 ** (0.4 * np.arange(4)) / np.sum(4 ** (0.4 * np.arange(4)))
     slides, over_m = 60.0 * 1.5 ** np.arange(3) / np.sum(1.5 ** np.arange(3)), 2e-4 * 3.0 ** np.arange(3)

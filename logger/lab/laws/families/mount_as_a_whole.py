@@ -21,29 +21,27 @@ def laws(self, p, laws):
     return creeping.with_law(Between.BODY_AND_WHEEL, rubs, p, rub_rates, memory=(0.0, 0.0, 0.0))
 """
 _FUNCTIONS = """
-TRAVEL_M = {travel_m!r}
-
-
 def bent_n(p, travel_m):
-    at = travel_m / TRAVEL_M
+    at = travel_m / p.usual_travel_m
     return p.spring_square_n * at**2 + p.spring_cube_n * at**3
 
 
 def creeps(p, seen):  # the memory is the stretch of each branch's spring over the usual travel
     a, b, c, d = seen.memory
     share = 4**p.creep_power
-    return p.creep_n_per_m * TRAVEL_M * (a + share * (b + share * (c + share * d))) / (1 + share + share**2 + share**3)
+    stretch_m = p.usual_travel_m * (a + share * (b + share * (c + share * d)))
+    return p.creep_n_per_m * stretch_m / (1 + share + share**2 + share**3)
 
 
 def creep_rates(p, seen):
     a, b, c, d = seen.memory
-    rate = seen.rate_mps / TRAVEL_M
+    rate = seen.rate_mps / p.usual_travel_m
     return ({creep_rates})
 
 
 def rubs(p, seen):  # the memory is the force of each element over that with which it slides
     early, middle, late = seen.memory
-    share, more = p.late_force_ratio, 1 + p.load_ratio * seen.travel_m / TRAVEL_M
+    share, more = p.late_force_ratio, 1 + p.load_ratio * seen.travel_m / p.usual_travel_m
     return p.friction_n * np.maximum(more, 0.0) * (early + share * (middle + share * late)) / (1 + share + share**2)
 
 
@@ -101,8 +99,10 @@ class MountAsAWhole(Family):
                        may_end=True),
              Parameter("late_force_ratio", 1.0, 0.02, 50.0, None, Scale.LOG, (1.0,), "of their forces", may_end=True),
              Parameter("load_ratio", 0.05, -5.0, 5.0, None, Scale.LINEAR, (0.05,),
-                       f"of the friction at {1000 * travel_m:g} mm over that at rest, less 1", step=0.02)),
-            _METHOD.format(rate_mps=rate_mps), _FUNCTIONS.format(travel_m=travel_m, creep_rates=", ".join(
+                       f"of the friction at {1000 * travel_m:g} mm over that at rest, less 1", step=0.02),
+             Parameter("usual_travel_m", travel_m, travel_m, travel_m, None, Scale.LOG, (travel_m,),
+                       "at which these have their sizes", default=travel_m)),
+            _METHOD.format(rate_mps=rate_mps), _FUNCTIONS.format(creep_rates=", ".join(
                 f"rate - {name} / {time_s!r}" for name, time_s in zip("abcd", _TIMES_S, strict=True))),
             at="loop")]
 
