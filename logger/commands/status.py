@@ -15,7 +15,7 @@ from logger.service.status import SensorStatus, ServiceStatus, StorageStatus, pr
 from logger.store.export.sticks import FOLDER, StickNote, read_notes
 from logger.store.log.atomic_file import READ_ONLY
 
-_START = "Start it: sudo systemctl start ridelog   (or, in a terminal: ridelog run)"
+_START = "Start it: sudo systemctl start ridelog (not installed yet: sudo ridelog install; in a terminal: ridelog run)"
 _JOURNAL = "See why: journalctl -u ridelog -n 50"
 _LITTLE_ROOM_BYTES = 200_000_000
 
