@@ -237,6 +237,14 @@ def test_an_asymmetric_damper_keeps_its_mean_and_a_digressive_one_its_slope_befo
     assert by_direction.damper(np.array([0.05, -0.2, 0.25, -0.3])) == pytest.approx([50, -200, 150, -212.5])
 
 
+def test_a_stop_of_two_stages_is_a_line_with_two_bends() -> None:
+    stop = usual(EFFECTS["bump_stop"], clearance_m=0.02, stop_stiffness_n_per_m=1e4, second_clearance_ratio=1.5,
+                 second_stiffness_ratio=5.0)
+    travel_m = np.linspace(-0.06, 0.06, 121)
+    expected_n = np.interp(travel_m, [-0.06, -0.03, -0.02, 0.0], [-100.0 - 1500.0, -100.0, 0.0, 0.0])
+    assert stop.effect.laws(stop.p, linear(1000.0)).by_travel_n(travel_m) == pytest.approx(expected_n, abs=1e-9)
+
+
 def test_a_shift_of_the_centre_of_gravity_leaves_axles_and_sensor_where_they_are() -> None:
     away = replace(HALF, sensor=replace(HALF.sensor, ahead_m=0.2))
     made = compose(away, [usual(EFFECTS["cg_shift"], shift_m=0.1)]).vehicle

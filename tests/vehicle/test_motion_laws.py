@@ -148,6 +148,14 @@ def test_hysteresis_moves_as_newton_says(travel_m: float, sharpness: float, reve
     assert off(states, expected, plain) < 0.01
 
 
+def test_a_sail_on_the_body_drags_by_the_square_of_its_speed(plain: np.ndarray) -> None:
+    def added(t, x, v, d, d_mps, u_mps, z):
+        return 400 * (v + u_mps) * abs(v + u_mps), 0.0, []
+
+    states, _ = stepped(effect("orifice_damping", quadratic_damping_n_s2_per_m2=0.0, body_drag_n_s2_per_m2=400.0))
+    assert off(states, by_newton(added)[:, :4], plain) < 0.01
+
+
 @pytest.mark.parametrize("travel_m", [0.002, 0.01])
 def test_cars_that_hardly_differ_move_alike(travel_m: float, plain: np.ndarray) -> None:
     """At no force a root of it rises without end: where a memory came near 0, one in a hundred cars was thrown away."""
