@@ -133,18 +133,20 @@ def test_a_rig_comes_to_rest_and_stays() -> None:
     assert abs(states[-1, 0] - states[-1, 1]) * 20000.0 < 100.0 + 1.0
 
 
-@pytest.mark.parametrize(("travel_m", "sharpness", "reversal"), [
-    (3e-5, 1.0, 1.0), (0.0003, 1.0, 1.0), (0.002, 1.0, 1.0), (0.004, 2.0, 1.0), (0.001, 0.7, 1.0), (0.002, 1.0, 2.0),
-    (0.01, 1.0, -5.0)])
-def test_hysteresis_moves_as_newton_says(travel_m: float, sharpness: float, reversal: float, plain: np.ndarray) -> None:
+@pytest.mark.parametrize(("travel_m", "sharpness", "reversal", "static"), [
+    (3e-5, 1.0, 1.0, 1.0), (0.0003, 1.0, 1.0, 1.0), (0.002, 1.0, 1.0, 1.0), (0.004, 2.0, 1.0, 1.0),
+    (0.001, 0.7, 1.0, 1.0), (0.002, 1.0, 2.0, 1.0), (0.01, 1.0, -5.0, 1.0), (0.0003, 1.0, 2.0, 1.8)])
+def test_hysteresis_moves_as_newton_says(travel_m: float, sharpness: float, reversal: float, static: float,
+                                         plain: np.ndarray) -> None:
     def added(t, x, v, d, d_mps, u_mps, z):
         loading, unloading = (1.0, 1.0 - reversal) if reversal > 0 else (1 / reversal, 1 / reversal - 1)
-        grow = v / travel_m * (1 - abs(z[0]) ** sharpness * (loading if v * z[0] > 0 else unloading))
+        slides_at = 1 + (static - 1) * np.exp(-(v / 0.05)**2)
+        grow = v / travel_m * (1 - abs(z[0] / slides_at) ** sharpness * (loading if v * z[0] > 0 else unloading))
         return 120 * z[0], -120 * z[0], [grow]
 
     expected = by_newton(added, 1)[:, :4]
     states, _ = stepped(effect("hysteresis", yield_force_n=120.0, yield_travel_m=travel_m, sharpness_ratio=sharpness,
-                               reversal_ratio=reversal))
+                               reversal_ratio=reversal, static_to_sliding_ratio=static))
     assert off(states, expected, plain) < 0.01
 
 
@@ -207,7 +209,7 @@ def test_the_loop_is_as_large_as_it_has_to_be() -> None:
     then as 1 - exp(-x / y), so half a turn of 2 a takes (2 a - (1/2 + 1 + 1) y) F. Within it each half way begins at
     -z1, and comes straight to 0, then curved to z1: the area is known from z1 alone."""
     force_n, y = 120.0, 0.002
-    values = SimpleNamespace(yield_force_n=force_n, yield_travel_m=y, sharpness_ratio=1.0, reversal_ratio=1.0)
+    values = effect("hysteresis", yield_force_n=force_n, yield_travel_m=y).p
     large = 2 * force_n * (2 * 0.05 - 2.5 * y)
     assert loop_area_n_m(0.05, values) == pytest.approx(large, rel=1e-3)
     for small in (0.001, 0.003):
@@ -223,7 +225,7 @@ def test_the_loop_is_as_large_as_it_has_to_be() -> None:
 def test_the_loop_of_what_hardens_is_as_large_as_it_has_to_be(reversal: float) -> None:
     """n = 1. Each half way begins at -z1: back to 0 with 1 + (1 + h) |z|, h = -1 / r, then on to z1 with 1 + h z."""
     force_n, y, h, a = 120.0, 0.002, -1 / reversal, 0.0015
-    values = SimpleNamespace(yield_force_n=force_n, yield_travel_m=y, sharpness_ratio=1.0, reversal_ratio=reversal)
+    values = effect("hysteresis", yield_force_n=force_n, yield_travel_m=y, reversal_ratio=reversal).p
     c = 1 + h
     z1 = brentq(lambda z: np.log1p(h * z) / h + np.log1p(c * z) / c - 2 * a / y, 0.0, 10.0)
     area = 2 * force_n * y * ((z1 / h - np.log1p(h * z1) / h**2) - (z1 / c - np.log1p(c * z1) / c**2))
@@ -232,7 +234,7 @@ def test_the_loop_of_what_hardens_is_as_large_as_it_has_to_be(reversal: float) -
 
 def test_no_friction_gives_energy() -> None:
     """Over any closed way the work of the force, less what is stored in its first stiffness, is a loss."""
-    values = SimpleNamespace(yield_force_n=1.0, yield_travel_m=1.0, sharpness_ratio=1.0, reversal_ratio=1.0)
+    values = SimpleNamespace(**shipped_effects()["hysteresis"].usual | {"yield_force_n": 1.0, "yield_travel_m": 1.0})
     x = np.cumsum(np.random.default_rng(3).standard_normal(20000)) * 0.03
     for values.sharpness_ratio, values.reversal_ratio in ((0.5, 1.0), (1.0, 1.0), (4.0, 1.0), (1.0, 2.0)):
         z, lost = 0.0, [0.0]
@@ -313,7 +315,7 @@ def test_two_states_are_stepped_with_the_car(tmp_path: Path, plain: np.ndarray) 
 
 
 def test_a_compiled_law_answers_as_it_is_written() -> None:
-    values = SimpleNamespace(yield_force_n=7.0, yield_travel_m=0.5, sharpness_ratio=1.5, reversal_ratio=1.0)
+    values = effect("hysteresis", yield_force_n=7.0, yield_travel_m=0.02, sharpness_ratio=1.5).p
     law = MotionLaw(Between.BODY_AND_WHEEL, force, values, rates, (0.0,))
     felt = np.linspace(-0.4, 0.6, stepping_loop.FELT)
     seen = Seen(*felt[: stepping_loop.MEMORY_AT], (felt[stepping_loop.MEMORY_AT],))
