@@ -158,6 +158,18 @@ def test_a_sail_on_the_body_drags_by_the_square_of_its_speed(plain: np.ndarray) 
     assert off(states, by_newton(added)[:, :4], plain) < 0.01
 
 
+def test_a_spring_that_is_slack_neither_pulls_nor_damps(plain: np.ndarray) -> None:
+    """What spring and damper carry at rest is all that they can give up: it is that of 3 mm."""
+    k, c = RIG.front.suspension_stiffness_n_per_m, RIG.front.suspension_damping_n_s_per_m
+
+    def added(t, x, v, d, d_mps, u_mps, z):
+        less = min(k * 0.003 - k * x - c * v, 0.0)
+        return less, -less, []
+
+    states, _ = stepped(effect("slack_spring", slack_extension_m=0.003))
+    assert off(states, by_newton(added)[:, :4], plain) < 0.01
+
+
 @pytest.mark.parametrize("travel_m", [0.002, 0.01])
 def test_cars_that_hardly_differ_move_alike(travel_m: float, plain: np.ndarray) -> None:
     """At no force a root of it rises without end: where a memory came near 0, one in a hundred cars was thrown away."""
@@ -549,7 +561,7 @@ def test_which_a_search_tries_unasked() -> None:
     assert {"hysteresis", "frame_friction"}.isdisjoint(known_effects(model, [])[0])
     assert known_effects(model, [], on_rig=True)[0].keys() - known_effects(model, [])[0] == {
         "constant_force", "force_gain", "force_limit", "frame_damping", "frame_friction", "frame_spring",
-        "orifice_damping", "play", "maxwell_element"}
+        "orifice_damping", "play", "slack_spring", "maxwell_element"}
     assert known_effects(model, ["hysteresis"])[0].keys() - known_effects(model, [])[0] == {"hysteresis"}
     assert sought_effects(True, of_part=True).keys() - sought_effects(True) == {"hysteresis"}
     with pytest.raises(BadInput, match="each effect once, found dry_friction again"):
