@@ -264,6 +264,9 @@ def look_through(effect: object) -> Effect:
         raise ValueError(f"expected replaces to be a tuple of names of parameters, found {effect.replaces!r}")
     for one in effect.parameters:
         _look_through(one)
+    refined = [one for one in effect.parameters if one.name in effect.refinements]
+    if refined and all({*one.trials} == {effect.usual[one.name]} for one in refined):
+        raise ValueError(f"{refined[0].name}: expected trials away from its usual value, which refinements begin at")
     return effect
 
 

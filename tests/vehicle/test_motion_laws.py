@@ -158,6 +158,20 @@ def test_a_sail_on_the_body_drags_by_the_square_of_its_speed(plain: np.ndarray) 
     assert off(states, by_newton(added)[:, :4], plain) < 0.01
 
 
+def test_a_gas_is_squeezed_by_its_own_law(plain: np.ndarray) -> None:
+    """By Poisson: p V^n is one number, whatever the column's area."""
+    stiffness, length_m, area_m2 = RIG.front.suspension_stiffness_n_per_m, 0.02, 0.003
+    rest_pa = stiffness * length_m / (1.4 * area_m2)
+
+    def added(t, x, v, d, d_mps, u_mps, z):
+        volume_m3 = area_m2 * (length_m + x)
+        more = area_m2 * rest_pa * (1 - (area_m2 * length_m / volume_m3) ** 1.4) - stiffness * x
+        return more, -more, []
+
+    states, _ = stepped(effect("gas_spring", column_length_m=length_m, polytropic_exponent=1.4))
+    assert off(states, by_newton(added)[:, :4], plain) < 0.01
+
+
 def test_a_spring_that_is_slack_neither_pulls_nor_damps(plain: np.ndarray) -> None:
     """What spring and damper carry at rest is all that they can give up: it is that of 3 mm."""
     k, c = RIG.front.suspension_stiffness_n_per_m, RIG.front.suspension_damping_n_s_per_m
@@ -561,7 +575,7 @@ def test_which_a_search_tries_unasked() -> None:
     assert {"hysteresis", "frame_friction"}.isdisjoint(known_effects(model, [])[0])
     assert known_effects(model, [], on_rig=True)[0].keys() - known_effects(model, [])[0] == {
         "constant_force", "force_gain", "force_limit", "frame_damping", "frame_friction", "frame_spring",
-        "orifice_damping", "play", "slack_spring", "maxwell_element"}
+        "gas_spring", "orifice_damping", "play", "slack_spring", "maxwell_element"}
     assert known_effects(model, ["hysteresis"])[0].keys() - known_effects(model, [])[0] == {"hysteresis"}
     assert sought_effects(True, of_part=True).keys() - sought_effects(True) == {"hysteresis"}
     with pytest.raises(BadInput, match="each effect once, found dry_friction again"):

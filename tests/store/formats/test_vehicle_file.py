@@ -490,6 +490,8 @@ def test_complaints_about_the_history_name_the_line(tmp_path: Path, step: str, w
     ("(100.0,)", "100.0", ": drag_n_s2_per_m2: expected trials, the values that a search begins at"),
     ("(100.0,)", "()", ": drag_n_s2_per_m2: expected trials, the values that a search begins at"),
     ("(100.0,)", "(0.0,)", ": drag_n_s2_per_m2: expected trials away from 0.0, where the effect does nothing"),
+    ('source = "mine"', 'source = "mine"; refinements = ("drag_n_s2_per_m2",)',
+     ": drag_n_s2_per_m2: expected trials away from its usual value"),
     ("(100.0,)", "(-100.0,)", ": drag_n_s2_per_m2: expected trials, choices and default within 0.0 to 5000.0"),
     ('Parameter("drag_n_s2_per_m2"', 'Parameter("file"', ": expected a parameter's name of letters"),
     ("parameters = (", "parameters = [] or (1,", ": expected parameters to be a tuple of Parameter"),
