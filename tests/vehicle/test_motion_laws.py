@@ -158,6 +158,22 @@ def test_a_sail_on_the_body_drags_by_the_square_of_its_speed(plain: np.ndarray) 
     assert off(states, by_newton(added)[:, :4], plain) < 0.01
 
 
+@pytest.mark.parametrize("damper_plays", [0.0, 1.0])
+def test_a_joint_with_play_moves_freely_within_its_gap(damper_plays: float, plain: np.ndarray) -> None:
+    """A bolt that holds spring and damper is pressed against one end of its hole or the other, and neither pulls it
+    back; of a spring alone the damper goes on."""
+    k, c, gap_m = (RIG.front.suspension_stiffness_n_per_m, RIG.front.suspension_damping_n_s_per_m, 0.002)
+
+    def added(t, x, v, d, d_mps, u_mps, z):
+        damped = c * v
+        held = damped * damper_plays
+        pressed = max(k * (x - gap_m) + held, 0.0) + min(k * (x + gap_m) + held, 0.0) + damped - held
+        return pressed - k * x - damped, k * x + damped - pressed, []
+
+    states, _ = stepped(effect("play", half_gap_m=gap_m, damper_plays=damper_plays))
+    assert off(states, by_newton(added)[:, :4], plain) < 0.01
+
+
 def test_a_gas_is_squeezed_by_its_own_law(plain: np.ndarray) -> None:
     """By Poisson: p V^n is one number, whatever the column's area."""
     stiffness, length_m, area_m2 = RIG.front.suspension_stiffness_n_per_m, 0.02, 0.003
