@@ -214,7 +214,7 @@ class Effect(ABC):
                  are at their defaults: no fit moves them then, and a search tries both
     terms        those refinements that add a term of their own, of which nothing is left at 0
     variants     by the vehicle's model: the effect that stands in its place, where that has fewer parts than the
-                 parameters speak of
+                 parameters speak of, or its bench shows more of them
     """
 
     name: str

@@ -234,8 +234,8 @@ def test_an_asymmetric_damper_keeps_its_mean_and_a_digressive_one_its_slope_befo
     assert digressive.damper(np.array([0.05, -0.1, 0.3, -0.3])) == pytest.approx([50, -100, 150, -150])
     rates = np.array([0.0, 0.05, -0.1, 0.3, -0.3])
     for roundness, inner in ((1.0, rates / (1 + np.abs(rates) / 0.1)), (0.5, rates / np.hypot(1, rates / 0.1))):
-        hyperbolic = EFFECTS["damper_blow_off"].laws(usual(
-            EFFECTS["damper_blow_off"], **values, knee_roundness_ratio=roundness).p, linear(1000.0))
+        of_part = EFFECTS["damper_blow_off"].variants["component"]
+        hyperbolic = of_part.laws(usual(of_part, **values, knee_roundness_ratio=roundness).p, linear(1000.0))
         assert hyperbolic.damper(rates) == pytest.approx(1000 * (0.25 * rates + 0.75 * inner))
     values |= {"rebound_to_bump_knee_ratio": 0.25, "rebound_to_bump_slope_ratio": 4.0}
     by_direction = EFFECTS["damper_blow_off"].laws(usual(EFFECTS["damper_blow_off"], **values).p, linear(1000.0))

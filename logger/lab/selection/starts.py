@@ -76,10 +76,10 @@ class UnknownNumbers(MeasuredRoad):
     tried        so many of those around the file's car, the best of each form, are improved a little, and one of those
                  around the fitted one, which lie in its valley
     starts       so many of those without an effect, or where others have shown the car, are improved to the end
-    most         work of simulations (``SimulatedRuns.work``) after which a search takes no further step: two minutes of
-                 a processor (a judgement: with half of it a body's guide was taken for a wheel's, and a brake's spring
-                 explained no more than a part). A round draws cars until ``Search.share`` of it is done or, where it
-                 is, a sixth more (a judgement)
+    most         work of simulations (``SimulatedRuns.work``) after which a search takes no further step: some three
+                 minutes of a processor (a judgement: with a third of it a body's guide was taken for a wheel's, and
+                 with two thirds the hardening of a leaf spring was not tried after its friction). A round draws cars
+                 until ``Search.share`` of it is done or, where it is, a sixth more (a judgement)
     ends         of how many of these the fit of an effect ended at the best, by name
     not_tried    what a search stopped before
     """
@@ -87,7 +87,7 @@ class UnknownNumbers(MeasuredRoad):
     draws: int = 120
     tried: int = 3
     starts: int = 2
-    most: float = 1.2e9
+    most: float = 2e9
     ends: dict[str, tuple[int, int]] = field(default_factory=dict)
     not_tried: list[str] = field(default_factory=list)
     _runs: SimulatedRuns | None = None
