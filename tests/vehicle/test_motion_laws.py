@@ -184,7 +184,7 @@ def test_a_gas_is_squeezed_by_its_own_law(plain: np.ndarray) -> None:
         more = area_m2 * rest_pa * (1 - (area_m2 * length_m / volume_m3) ** 1.4) - stiffness * x
         return more, -more, []
 
-    states, _ = stepped(effect("gas_spring", column_length_m=length_m, polytropic_exponent=1.4))
+    states, _ = stepped(effect("air_spring", column_length_m=length_m, polytropic_exponent=1.4))
     assert off(states, by_newton(added)[:, :4], plain) < 0.01
 
 
@@ -591,7 +591,7 @@ def test_which_a_search_tries_unasked() -> None:
     assert {"hysteresis", "frame_friction"}.isdisjoint(known_effects(model, [])[0])
     assert known_effects(model, [], on_rig=True)[0].keys() - known_effects(model, [])[0] == {
         "constant_force", "force_gain", "force_limit", "frame_damping", "frame_friction", "frame_spring",
-        "gas_spring", "orifice_damping", "play", "slack_spring", "maxwell_element"}
+        "air_spring", "orifice_damping", "play", "slack_spring", "maxwell_element"}
     assert known_effects(model, ["hysteresis"])[0].keys() - known_effects(model, [])[0] == {"hysteresis"}
     assert sought_effects(True, of_part=True).keys() - sought_effects(True) == {"hysteresis"}
     with pytest.raises(BadInput, match="each effect once, found dry_friction again"):

@@ -18,7 +18,7 @@ from logger.vehicle.vehicle import Vehicle
 _SHORTEST = 0.05
 
 
-class GasSpring(ForceEffect):
+class AirSpring(ForceEffect):
     title = "a spring of air or gas: stiffer in compression, softer in extension"
     parameters = (
         Parameter("column_length_m", 0.15, 0.005, 10.0, float("inf"), Scale.RECIPROCAL, (0.05, 0.15, 0.5),
@@ -49,4 +49,4 @@ class GasSpring(ForceEffect):
         return laws.with_spring(beyond_linear)
 
 
-EFFECT = GasSpring()
+EFFECT = AirSpring()
