@@ -76,11 +76,12 @@ def answered(samples: Array, answer: Array, rate_hz: float, up_to_hz: float) -> 
     if not np.ptp(samples):
         return np.ones(count)
     f_hz = np.fft.rfftfreq(count, 1 / rate_hz)
-    moved, found = (np.fft.rfft(np.hanning(count) * (one - np.linspace(one[0], one[-1], count)))
-                    for one in (samples, answer))
-    stiff, damped = (float(np.vdot(one, found).real / np.vdot(one, one).real)
-                     for one in (moved, 2j * np.pi * f_hz * moved))
-    expected = (stiff + 2j * np.pi * f_hz * damped) * moved
+    # The rate is windowed as the motion is: far from a loud tone the window's own trace times 2 pi i f is no rate. Its
+    # differences over two samples make little of quick motions, so that of these less is taken for noise.
+    moved, quick, found = (np.fft.rfft(np.hanning(count) * (one - np.linspace(one[0], one[-1], count)))
+                           for one in (samples, rate_hz * np.gradient(samples), answer))
+    stiff, damped = (float(np.vdot(one, found).real / np.vdot(one, one).real) for one in (moved, quick))
+    expected = stiff * moved + damped * quick
     power, own, cross = (_local(one, _NEAR // 2) for one in (
         np.abs(expected) ** 2, np.abs(found) ** 2, expected.conj() * found))
     tiny = np.finfo(float).tiny

@@ -92,6 +92,16 @@ def test_what_a_damper_does_not_answer_is_noise(hum_m: float, shakes_m: float, n
         assert np.abs(answered - as_read).max() < 1e-5
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_the_trace_of_a_loud_stroke_at_other_frequencies_is_no_noise(seed: int) -> None:
+    """Three seconds of a stroke that grows and falls, and a linear damper's force with noise of half a per cent."""
+    time_s = np.arange(1500) / 500.0
+    grows, turn = 1 + 0.5 * np.sin(2 * np.pi * 0.37 * time_s), 2 * np.pi * 1.5
+    travel_m = 0.02 * np.sin(turn * time_s) * grows
+    force_n = 5000 * travel_m + 1500 * np.gradient(travel_m, time_s) + np.random.default_rng(seed).normal(0, 1, 1500)
+    assert answered(travel_m, force_n, 500.0, 200.0).tolist() == [1.0] * 1500
+
+
 def test_nothing_of_what_stands_still_is_noise() -> None:
     force_n = np.random.default_rng(1).standard_normal(500)
     assert answered(np.zeros(500), force_n, 500.0, 100.0).tolist() == [1.0] * 500
