@@ -24,7 +24,7 @@ class AirSpring(ForceEffect):
         Parameter("column_length_m", 0.15, 0.005, 10.0, float("inf"), Scale.RECIPROCAL, (0.05, 0.15, 0.5),
                   "of the gas at rest: its volume over its area"),
         Parameter("polytropic_exponent", 1.0, 0.5, 3.0, None, Scale.LINEAR, (1.0,),
-                  "1: squeezed slowly; 1.4: so quickly that it keeps its heat", default=1.3),
+                  "1.3 unless said; 1: squeezed slowly; 1.4: so quickly that it keeps its heat", default=1.3),
         AXLE,
     )
     refinements = ("polytropic_exponent",)
