@@ -319,7 +319,7 @@ def test_an_effect_of_ones_own(folder: Path, monkeypatch: pytest.MonkeyPatch) ->
 
 
 @pytest.mark.parametrize(("effect", "complaint"), [
-    ("friction", "no effect 'friction': expected one of body_bending, bump_stop"),
+    ("friction", "no effect 'friction': expected one of air_spring, body_bending, bump_stop"),
     ("dry_friction:force=3", "--effect dry_friction:force=3: dry_friction has no parameter 'force'; expected friction"),
     ("dry_friction:friction_force_n=-3", "--effect dry_friction:friction_force_n=-3: dry_friction: expected friction_"),
     ("dry_friction:friction_force_n", "--effect dry_friction:friction_force_n: expected PARAM=NUMBER, found 'friction"),

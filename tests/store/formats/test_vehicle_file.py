@@ -423,7 +423,7 @@ def test_an_effect_of_ones_own_is_found_beside_the_vehicles_file(
 EFFECT_COMPLAINTS = [
     ("{cutoff_hz: 2}", "expected the key 'name' here, it is missing"),
     ("tire_damping", "expected a mapping (key: value lines), found 'tire_damping'"),
-    ("{name: tyre_damping}", "expected one of body_bending, bump_stop, cg_shift"),
+    ("{name: tyre_damping}", "expected one of air_spring, body_bending, bump_stop, cg_shift"),
     ("{name: tire_damping}", "expected the key 'tire_damping_n_s_per_m' here, it is missing"),
     ("{name: tire_damping, tire_damping_n_s_per_m: -1}", "expected a number from 0 to 3000, found '-1'"),
     ("{name: tire_damping, tire_damping_n_s_per_m: .inf}", "expected a number from 0 to 3000, found '.inf'"),
