@@ -202,6 +202,7 @@ class Effect(ABC):
     sought_last  whether it does so anywhere else, too, where all others leave something unexplained
     needs_road   whether it asks for a road, a speed or a distance, which a rig does not have
     needs_wheel  whether it asks for a wheel, a tire or a car's body, which a mass on a base does not have
+    needs_spring whether it asks for a suspension's, a part's or a mass's own spring
     needs_body   whether something hangs on what moves freely, which a part that its bench moves does not
     against_ground  whether it acts between what moves and the ground; where the base of a mass rests, it is what acts
                  between that and the base
@@ -231,6 +232,7 @@ class Effect(ABC):
     sought_last: bool = False
     needs_road: bool = False
     needs_wheel: bool = False
+    needs_spring: bool = False
     needs_body: bool = False
     against_ground: bool = False
     not_of: tuple[str, ...] = ()
@@ -258,7 +260,9 @@ class Effect(ABC):
 
     def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:
         """Why it cannot be there in this vehicle on this road; None if it can."""
-        return None
+        axles = (one for one in (vehicle.front, vehicle.rear) if one is not None)
+        has_spring = any(one.suspension_stiffness_n_per_m for one in axles)
+        return None if has_spring or not self.needs_spring else "it needs a spring"
 
     def obstacle_on(self, vehicle: Vehicle, two_tracks: bool, timed: bool, pushed: bool) -> str | None:
         """The same where runs may be driven by time (``timed``), or by forces (``pushed``)."""

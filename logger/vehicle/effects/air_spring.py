@@ -13,7 +13,6 @@ import numpy as np
 from logger.arrays import Array
 from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Sought, Values
 from logger.vehicle.laws import CornerLaws
-from logger.vehicle.vehicle import Vehicle
 
 _SHORTEST = 0.05
 
@@ -32,10 +31,7 @@ class AirSpring(ForceEffect):
     signature = "the waves have sharper ends where the spring is short than where it is long"
     shown_by = "move it over much of its travel, slowly and fast"
     sought = Sought.ON_RIGS
-
-    def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:
-        axles = [one for one in (vehicle.front, vehicle.rear) if one is not None]
-        return None if any(one.suspension_stiffness_n_per_m for one in axles) else "it needs a spring"
+    needs_spring = True
 
     def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
         length_m, power, stiffness = p.column_length_m, p.polytropic_exponent, laws.stiffness_n_per_m

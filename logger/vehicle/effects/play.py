@@ -15,7 +15,6 @@ import numpy as np
 from logger.arrays import Array
 from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Sought, Values
 from logger.vehicle.laws import CornerLaws
-from logger.vehicle.vehicle import Vehicle
 
 
 class Play(ForceEffect):
@@ -32,10 +31,7 @@ class Play(ForceEffect):
     signature = "small motions meet no spring, and resonances rise in frequency with the motion"
     shown_by = "move it by little more than the gap, and by many times that"
     sought = Sought.ON_RIGS
-
-    def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:
-        axles = [one for one in (vehicle.front, vehicle.rear) if one is not None]
-        return None if any(one.suspension_stiffness_n_per_m for one in axles) else "it needs a spring"
+    needs_spring = True
 
     def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
         gap_m, stiffness = p.half_gap_m, laws.stiffness_n_per_m

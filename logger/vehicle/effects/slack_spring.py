@@ -9,7 +9,6 @@ import numpy as np
 
 from logger.vehicle.effect import AXLE, ForceEffect, Parameter, Scale, Sought, Values
 from logger.vehicle.laws import CornerLaws
-from logger.vehicle.vehicle import Vehicle
 
 
 class SlackSpring(ForceEffect):
@@ -23,10 +22,7 @@ class SlackSpring(ForceEffect):
     signature = "strong motions swing farther to one side, and more slowly than weak ones"
     shown_by = "move it by more than its load stretches it"
     sought = Sought.ON_RIGS
-
-    def obstacle(self, vehicle: Vehicle, two_tracks: bool) -> str | None:
-        axles = [one for one in (vehicle.front, vehicle.rear) if one is not None]
-        return None if any(one.suspension_stiffness_n_per_m for one in axles) else "it needs a spring"
+    needs_spring = True
 
     def laws(self, p: Values, laws: CornerLaws) -> CornerLaws:
         slack_m, stiffness, damping = p.slack_extension_m, laws.stiffness_n_per_m, laws.damping_n_s_per_m
